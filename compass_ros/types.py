@@ -1,0 +1,303 @@
+"""Frozen data that cross the steps. Arrays are read-only by convention; nobody writes into one that it was given.
+
+Units are SI. Frame `table`: origin at the centre of the table's surface, x along its length towards the goal, y to the
+left of x, z up. Time is integer nanoseconds of the sensor's clock. Quaternions are (w, x, y, z).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+Quantity = Literal["xy", "xyz", "pose", "joint"]
+"""What one row of a track holds: planar position [m], position [m], position [m] + quaternion, joint position [rad or m]."""
+
+QUANTITY_SIZE: Mapping[Quantity, int] = {"xy": 2, "xyz": 3, "pose": 7, "joint": 1}
+
+Channel = Literal["dynamics", "contact", "actuation", "sensing"]
+Phase = Literal["strike", "free", "wall_contact", "object_contact", "all"]
+Verdict = Literal["none", "named", "ambiguous", "unknown", "fit_failed", "data_bad", "not_evaluated"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One tunable number of the simulator, called `object@param_type@param` as in the paper."""
+
+    name: str
+    default: float
+    low: float
+    high: float
+    unit: str
+    half_width: float
+    """Half-width of the uniform randomisation around the current value, in `unit` (delta_r of Algorithm 2)."""
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class ActionField:
+    """One number of the shot command."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Track:
+    """What a sensor saw of one object. Frames in which the object was not seen are absent."""
+
+    object: str
+    quantity: Quantity
+    stamp_ns: Ints
+    """(F,) strictly increasing, the sensor's clock."""
+    value: Floats
+    """(F, QUANTITY_SIZE[quantity]) in the frame `table`."""
+    std: Floats | None = None
+    """(F,) one standard deviation of the position [m] (joint: [rad]) as the sensor states it; None: not stated."""
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One recorded shot."""
+
+    name: str
+    cell: str
+    cell_hash: str
+    """Hash of the cell's configuration at recording time; empty when the bag does not say (foreign bags)."""
+    action: Mapping[str, float]
+    """The shot command by name of its fields, SI units; empty for a passive recording."""
+    start_ns: int
+    """When the command was given, in the clock of the stamps. Simulated time 0."""
+    tracks: tuple[Track, ...]
+    initial_state: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    """Measured first state by object, where the cell does not fix it: position (and velocity) as the cell defines them."""
+    source: str = ""
+    """Path of the bag."""
+
+    def track(self, name: str) -> Track:
+        for track in self.tracks:
+            if track.object == name:
+                return track
+        raise KeyError(f"episode {self.name} has no track of '{name}'; it has {[t.object for t in self.tracks]}")
+
+
+@dataclass(frozen=True)
+class Progress:
+    """One step of a long computation, handed to a callback."""
+
+    stage: str
+    """What runs now, in words: 'calibrate', 'screen effects', ..."""
+    iteration: int
+    done: float
+    """Share of the whole, 0 to 1."""
+    gap: float
+    """Mean trajectory difference now [m]; NaN where it is not defined."""
+    sparsity: float
+    """Share of the graph's entries under the threshold; NaN where there is no graph."""
+
+
+class Report(Protocol):
+    """Takes progress; returns False to ask for a stop (the computation then returns what it has, marked cancelled)."""
+
+    def __call__(self, progress: Progress) -> bool: ...
+
+
+def silent(progress: Progress) -> bool:
+    """A `Report` that says nothing and never stops."""
+    return True
+
+
+Differences = Callable[[Floats, Ints], Floats]
+"""(B, P) parameter values, (B,) indices of episodes -> (B, K) trajectory differences, summed over time [m]."""
+
+
+@dataclass(frozen=True)
+class Graph:
+    """The causal graph: probability of an edge from each parameter to each factor's trajectory difference."""
+
+    parameters: tuple[str, ...]
+    factors: tuple[str, ...]
+    psi: Floats
+    """(P, K) in [0, 1]."""
+    threshold: float
+
+    @property
+    def sparsity(self) -> float:
+        """Share of entries under the threshold."""
+        return float(np.mean(self.psi < self.threshold))
+
+    def active(self) -> Bools:
+        """(P,) whether a parameter has an edge at or above the threshold."""
+        return np.asarray((self.psi >= self.threshold).any(axis=1))
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """State of a calibration after one iteration, for figures."""
+
+    values: Floats
+    """(P,) parameter values."""
+    difference: Floats
+    """(K,) mean trajectory difference on the fitted episodes before this iteration's update [m]."""
+    psi: Floats
+    """(P, K); empty (0, 0) for methods without a graph."""
+    rollouts: int
+    """Rollouts spent so far."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a calibration method returns, ours or a rival's."""
+
+    method: str
+    values: Floats
+    """(P,) in the order of the parameters it was given."""
+    std: Floats
+    """(P,) one standard deviation; NaN where the method gives none."""
+    identifiable: Bools
+    """(P,) False where the recordings cannot tell this parameter from others (or from nothing)."""
+    graph: Graph | None
+    trace: tuple[Iteration, ...]
+    rollouts: int
+    converged: bool
+    stop_reason: str
+    """One sentence: why it stopped."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Difference between simulated and recorded trajectories for one model on one set of episodes."""
+
+    d: Mapping[str, float]
+    """Mean trajectory difference by factor: sum over the cell's control steps of the 2-norm [m]."""
+    rmse_m: float
+    """Root mean square distance over all frames and objects [m]."""
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    name: str
+    unit: str
+    default: float
+    value: float
+    std: float
+    bounds: tuple[float, float]
+    active: bool
+    identifiable: bool
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Evidence:
+    held_out_gain: float
+    """Share of the excess held-out error (above the noise floor) that the effect removes; 1 = all."""
+    log_evidence: float
+    """Log evidence over the model without the effect, corrected for correlated noise."""
+    false_alarm_p: float
+    """Probability of such evidence where nothing is missing, from simulation of the fitted null model."""
+
+
+@dataclass(frozen=True)
+class EffectFinding:
+    name: str
+    parameters: Mapping[str, EffectParameter]
+    evidence: Evidence
+    equivalents: tuple[str, ...]
+    """Effects that these recordings cannot tell from this one."""
+
+
+@dataclass(frozen=True)
+class Region:
+    centre_m: tuple[float, float]
+    radius_m: float
+
+
+@dataclass(frozen=True)
+class Where:
+    object: str
+    """Name of the object, or 'all'."""
+    phase: Phase
+    channel: Channel | Literal["all"]
+    region: Region | None = None
+    time_s: tuple[float, float] | None = None
+    """From, to, since the command."""
+
+
+@dataclass(frozen=True)
+class Mismatch:
+    """The answer to question 3: what is left."""
+
+    verdict: Verdict
+    where: Where | None
+    effects: tuple[EffectFinding, ...]
+    undetectable: tuple[str, ...]
+    next_experiment: str
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Budget:
+    rollouts: int
+    simulated_seconds: float
+    wall_seconds: float
+
+
+@dataclass(frozen=True)
+class ReplayedTrack:
+    """One object of one episode, recorded and simulated, for drawing."""
+
+    object: str
+    time_s: Floats
+    """(F,) since the command."""
+    real: Floats
+    """(F, D) as recorded."""
+    nominal: Floats
+    """(F, D) simulated with the default parameters at the same times."""
+    calibrated: Floats
+    """(F, D) simulated with the calibrated parameters."""
+    with_effects: Floats | None
+    """(F, D) simulated with the effects too; None where no effect was fitted."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    episode: str
+    held_out: bool
+    tracks: tuple[ReplayedTrack, ...]
+
+
+@dataclass(frozen=True)
+class Result:
+    """Everything that a calibration says; `result.json` after design.md and the report are drawn from it."""
+
+    cell: str
+    method: str
+    seed: int
+    versions: Mapping[str, str]
+    budget: Budget
+    fit: tuple[str, ...]
+    held_out: tuple[str, ...]
+    gap: Mapping[Literal["nominal", "calibrated", "with_effects"], Mapping[Literal["fit", "held_out"], Gap]]
+    noise_floor_m: float
+    parameters: tuple[ParameterRow, ...]
+    graph: Graph
+    mismatch: Mismatch
+    trace: tuple[Iteration, ...]
+    replays: tuple[Replay, ...]
+    cancelled: bool = False
+    warnings: Sequence[str] = ()
