@@ -1,0 +1,70 @@
+"""One validated configuration; YAML files, the command line and ROS parameters all fill the same frozen dataclasses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+
+import yaml
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
+
+from compass_ros.errors import ConfigError, nearest
+
+_strict = ConfigDict(extra="forbid")
+
+
+@dataclass(frozen=True, config=_strict)
+class CompassConfig:
+    """Hyperparameters of the COMPASS method; defaults from the paper's table of hyperparameters."""
+
+    n_round: int = Field(10, ge=1, description="iterations of Algorithm 1")
+    n_cmd_action: int = Field(10, ge=1, description="real rollouts N used in an iteration")
+    n_sim: int = Field(64, ge=2, description="simulated rollouts M for each real one")
+    n_epochs: int = Field(4000, ge=1, description="passes over the data of one iteration")
+    batch_size: int = Field(64, ge=2)
+    learning_rate: float = Field(1e-3, gt=0)
+    emb_dim: int = Field(32, ge=1, description="width of the encoder of one parameter")
+    hidden_dim: tuple[int, ...] = (256, 256)
+    causal_dim: int = Field(32, ge=1, description="features d_z that pass through the graph")
+    sparse_weight: float = Field(0.003, ge=0, description="lambda of loss (2)")
+    sw_discount: float = Field(0.5, gt=0, le=1, description="factor on lambda from one iteration to the next")
+    threshold: float = Field(0.5, gt=0, lt=1, description="psi at or above this is an edge")
+    stop_gap_m: float = Field(0.0, ge=0, description="zeta: stop when the mean trajectory difference is below")
+
+
+@dataclass(frozen=True, config=_strict)
+class CalibrationConfig:
+    """What `compass calibrate` does; everything but the recordings and the cell."""
+
+    method: str = "default"
+    seed: int = Field(0, ge=0)
+    held_out_share: float = Field(0.25, ge=0, lt=1, description="share of the episodes that is never fitted")
+    threads: int = Field(0, ge=0, description="threads for rollouts; 0 = all cores. Results do not depend on it")
+    compass: CompassConfig = Field(default_factory=CompassConfig)
+
+
+def read_yaml(path: Path) -> Mapping[str, object]:
+    """The mapping in a YAML file, read with the safe loader. Raises ConfigError with one line."""
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from error
+    if not isinstance(content, dict):
+        raise ConfigError(f"{path}: expected a mapping at the top, found {type(content).__name__}")
+    return content
+
+
+def calibration_config(content: Mapping[str, object], where: str = "configuration") -> CalibrationConfig:
+    """Validate a mapping. Raises ConfigError naming the field, what was expected and what was found."""
+    try:
+        return TypeAdapter(CalibrationConfig).validate_python(dict(content))
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = ".".join(str(part) for part in first["loc"])
+        known = [f.name for f in (*fields(CalibrationConfig), *fields(CompassConfig))]
+        hint = nearest(name.rsplit(".", 1)[-1], known) if first["type"] == "unexpected_keyword_argument" else ""
+        raise ConfigError(f"{where}: {name}: {first['msg']}, found {first['input']!r}{hint}") from error
