@@ -1,0 +1,237 @@
+// Forces that MuJoCo does not know, added to qfrc_passive inside every step.
+//
+// MuJoCo calls compass_passive(model, data) once a step. It looks up the program registered for that model: a short list
+// of terms, each one kind of force on one object with up to 8 numbers. A model without a program is left alone, so other
+// models in the process are never touched. Programs are written by Python before a batch of rollouts starts and only read
+// while it runs; the look-up needs no lock. Formulas, units and sources: simulation/effects/NAME.py, one file an effect.
+
+#include <math.h>
+#include <stdint.h>
+#include <stddef.h>
+#include <mujoco/mjdata.h>
+#include <mujoco/mjmodel.h>
+
+enum { N_NUMBERS = 8, TABLE = 1 << 16 };
+
+// Order and values are those of `Kind` in simulation/native/program.py.
+enum Kind {
+  TABLE_FRICTION = 1, UNIFORM = 2, VISCOUS = 3, QUADRATIC = 4, CROSSWIND = 5, FAN = 6, SWIRL = 7, ATTRACTION = 8,
+  FRICTION_PATCH = 9, FRICTION_GRADIENT = 10, ANISOTROPIC = 11, STRIBECK = 12, COULOMB = 13, MAGNUS = 14, PULSATING = 15,
+  RATE_RESTITUTION = 16, TANGENTIAL = 17, LIBRARY = 18,
+};
+
+// What the object is, and so where its forces go.
+enum Object { PLANAR = 0, BODY = 1, JOINT = 2 };
+
+typedef struct {
+  int32_t kind, object;   // enum Kind, enum Object
+  int32_t id, dof;        // body id (JOINT: joint id); first of its degrees of freedom
+  double number[N_NUMBERS];
+} Term;
+
+typedef struct {
+  int64_t n;
+  const Term* term;
+} Program;
+
+typedef struct {
+  const mjModel* model;
+  const Program* program;
+} Entry;
+
+typedef void (*ApplyFT)(const mjModel*, mjData*, const mjtNum*, const mjtNum*, const mjtNum*, int, mjtNum*);
+
+static Entry entries[TABLE];
+static ApplyFT apply_ft;
+
+static size_t slot_of(const mjModel* model) {
+  size_t slot = ((uintptr_t)model >> 6) * 2654435761u % TABLE;
+  while (entries[slot].model && entries[slot].model != model) slot = (slot + 1) % TABLE;
+  return slot;
+}
+
+void compass_init(ApplyFT function) { apply_ft = function; }
+
+// Registers a program for a model, or with NULL stops using one. An entry keeps its slot, so chains stay whole.
+void compass_register(const mjModel* model, const Program* program) {
+  size_t slot = slot_of(model);
+  entries[slot].model = model;
+  entries[slot].program = program;
+}
+
+// --- forces on one object -----------------------------------------------------------------------------------------------
+
+// What a force may depend on: position [m] and velocity [m/s] in the world (JOINT: angle and rate in [0]), inertia.
+typedef struct {
+  double x, y, vx, vy, vz, speed, mass, weight, time;
+} State;
+
+typedef struct {
+  double x, y, z;
+} Force;
+
+static Force along(const State* s, double magnitude, double creep) {   // against the velocity, smooth through zero
+  double k = -magnitude / sqrt(s->speed * s->speed + creep * creep);
+  return (Force){k * s->vx, k * s->vy, k * s->vz};
+}
+
+static Force evaluate(const Term* term, const State* s) {
+  const double* p = term->number;
+  const double rx = s->x - p[1], ry = s->y - p[2];   // used by the fields around a point
+  const double r = sqrt(rx * rx + ry * ry);
+  switch (term->kind) {
+    case TABLE_FRICTION:   // p: friction, creep speed, share of the weight that the table carries
+      return along(s, p[0] * s->weight * p[2], p[1]);
+    case COULOMB:          // p: friction (JOINT: torque), creep speed, share of the weight
+      return along(s, term->object == JOINT ? p[0] : p[0] * s->weight * p[2], p[1]);
+    case STRIBECK:         // p: extra friction at rest, creep speed, share of the weight, Stribeck speed
+      return along(s, p[0] * (term->object == JOINT ? 1.0 : s->weight * p[2]) * exp(-s->speed * s->speed / (p[3] * p[3])),
+                   p[1]);
+    case PULSATING:        // p: cosine and sine amplitude, creep speed, share of the weight, frequency
+      return along(s, (p[0] * cos(2 * M_PI * p[4] * s->time) + p[1] * sin(2 * M_PI * p[4] * s->time)) * s->weight * p[3],
+                   p[2]);
+    case FRICTION_PATCH: { // p: extra friction, centre x, y, radius, creep speed, share of the weight
+      double inside = 1.0 / (1.0 + exp(10.0 * (r / p[3] - 1.0)));
+      return along(s, p[0] * inside * s->weight * p[5], p[4]);
+    }
+    case FRICTION_GRADIENT:  // p: gradient along x, along y, creep speed, share of the weight
+      return along(s, (p[0] * s->x + p[1] * s->y) * s->weight * p[3], p[2]);
+    case ANISOTROPIC: {    // p: extra friction along x (less along y), along the diagonal, creep speed, share of the weight
+      double k = -s->weight * p[3] / sqrt(s->speed * s->speed + p[2] * p[2]);
+      return (Force){k * (p[0] * s->vx + p[1] * s->vy), k * (p[1] * s->vx - p[0] * s->vy), 0};
+    }
+    case UNIFORM:          // p: acceleration x, y, z
+      return (Force){s->mass * p[0], s->mass * p[1], s->mass * p[2]};
+    case VISCOUS:          // p: rate
+      return (Force){-s->mass * p[0] * s->vx, -s->mass * p[0] * s->vy, -s->mass * p[0] * s->vz};
+    case QUADRATIC: {      // p: inverse length
+      double k = -s->mass * p[0] * s->speed;
+      return (Force){k * s->vx, k * s->vy, k * s->vz};
+    }
+    case CROSSWIND: {      // p: acceleration at rest x, y, speed of the air
+      double a = sqrt(p[0] * p[0] + p[1] * p[1]);
+      if (a == 0) return (Force){0, 0, 0};
+      double ux = p[2] * p[0] / a - s->vx, uy = p[2] * p[1] / a - s->vy;
+      double k = s->mass * a * sqrt(ux * ux + uy * uy) / (p[2] * p[2]);
+      return (Force){k * ux, k * uy, 0};
+    }
+    case FAN:              // p: peak acceleration, centre x, y, radius of the peak
+    case SWIRL: {
+      double k = s->mass * p[0] / p[3] * exp(0.5 * (1.0 - r * r / (p[3] * p[3])));
+      return term->kind == FAN ? (Force){k * rx, k * ry, 0} : (Force){-k * ry, k * rx, 0};
+    }
+    case ATTRACTION: {     // p: peak acceleration, centre x, y, core radius; softened inverse square, peak at radius / sqrt(2)
+      double c = r * r + p[3] * p[3], k = -s->mass * p[0] * 2.598076211353316 * p[3] * p[3] / (c * sqrt(c));
+      return (Force){k * rx, k * ry, 0};
+    }
+    case MAGNUS:           // p: rate
+      return (Force){-s->mass * p[0] * s->vy, s->mass * p[0] * s->vx, 0};
+    case LIBRARY: {        // p: coefficient, powers of x, y, vx, vy, speed; component (0 x, 1 y, 2 against the velocity)
+      double value = s->mass * p[0] * pow(s->x, p[1]) * pow(s->y, p[2]) * pow(s->vx, p[3]) * pow(s->vy, p[4]) *
+                     pow(s->speed, p[5]);
+      if (p[6] == 2) return along(s, value, 1e-3);
+      return p[6] == 0 ? (Force){value, 0, 0} : (Force){0, value, 0};
+    }
+    default:
+      return (Force){0, 0, 0};
+  }
+}
+
+static void push(const mjModel* m, mjData* d, const Term* term) {
+  State s = {.time = d->time};
+  const double g = -m->opt.gravity[2];
+  const double* v = d->qvel + term->dof;
+  if (term->object == JOINT) {
+    s.x = d->qpos[m->jnt_qposadr[term->id]];
+    s.vx = v[0];
+    s.mass = 1;             // coefficients of joints are per unit of nothing: torque [N m] directly
+  } else {
+    const double* position = d->xipos + 3 * term->id;
+    s.x = position[0];
+    s.y = position[1];
+    s.mass = m->body_mass[term->id];
+    s.weight = s.mass * g;
+    s.vx = v[0];
+    s.vy = v[1];
+    s.vz = term->object == BODY ? v[2] : 0;   // a free joint's first three velocities are linear, in the world
+  }
+  s.speed = sqrt(s.vx * s.vx + s.vy * s.vy + s.vz * s.vz);
+  Force f = evaluate(term, &s);
+  if (term->object == BODY) {
+    mjtNum force[3] = {f.x, f.y, f.z}, torque[3] = {0, 0, 0};
+    apply_ft(m, d, force, torque, d->xipos + 3 * term->id, term->id, d->qfrc_passive);
+  } else {
+    d->qfrc_passive[term->dof] += f.x;
+    if (term->object == PLANAR) d->qfrc_passive[term->dof + 1] += f.y;
+  }
+}
+
+// --- contacts -----------------------------------------------------------------------------------------------------------
+
+static void body_velocity(const mjModel* m, const mjData* d, int body, const double* at, double out[3]) {
+  // velocity of the body's material point `at` [m/s]; cvel is (angular, linear) about the subtree's centre of mass
+  const double* w = d->cvel + 6 * body;
+  const double* c = d->subtree_com + 3 * m->body_rootid[body];
+  double r[3] = {at[0] - c[0], at[1] - c[1], at[2] - c[2]};
+  out[0] = w[3] + w[1] * r[2] - w[2] * r[1];
+  out[1] = w[4] + w[2] * r[0] - w[0] * r[2];
+  out[2] = w[5] + w[0] * r[1] - w[1] * r[0];
+}
+
+// Velocity of the contact's second body against its first: tangential part in v, returns the part along the normal.
+static double contact_velocity(const mjModel* m, const mjData* d, const mjContact* c, double v[3]) {
+  double va[3], normal = 0;
+  body_velocity(m, d, m->geom_bodyid[c->geom[0]], c->pos, va);
+  body_velocity(m, d, m->geom_bodyid[c->geom[1]], c->pos, v);
+  for (int k = 0; k < 3; k++) {
+    v[k] -= va[k];
+    normal += v[k] * c->frame[k];
+  }
+  for (int k = 0; k < 3; k++) v[k] -= normal * c->frame[k];
+  return normal;
+}
+
+// Damping that grows with the speed along the normal; MuJoCo reads efc_KBIP right after the passive forces.
+static void rate_dependent_restitution(const mjModel* m, mjData* d, const Term* term) {
+  for (int i = 0; i < d->ncon; i++) {
+    const mjContact* c = d->contact + i;
+    double v[3];
+    if (c->efc_address < 0) continue;
+    d->efc_KBIP[4 * c->efc_address + 1] *= 1.0 + term->number[0] * fabs(contact_velocity(m, d, c, v));
+  }
+}
+
+// Coulomb friction between the rims: the normal force is the spring and damper of the contact, before the solver's rounding.
+static void tangential_impulse(const mjModel* m, mjData* d, const Term* term) {
+  for (int i = 0; i < d->ncon; i++) {
+    const mjContact* c = d->contact + i;
+    if (c->efc_address < 0) continue;
+    int a = m->geom_bodyid[c->geom[0]], b = m->geom_bodyid[c->geom[1]];
+    double inverse = 0;
+    if (m->body_weldid[a]) inverse += 1 / m->body_mass[a];
+    if (m->body_weldid[b]) inverse += 1 / m->body_mass[b];
+    const double* kbip = d->efc_KBIP + 4 * c->efc_address;
+    double v[3], normal = contact_velocity(m, d, c, v);
+    double load = kbip[2] * (-kbip[0] * kbip[2] * (c->dist - c->includemargin) - kbip[1] * normal) / inverse;
+    if (load <= 0) continue;
+    double slip2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+    double scale = -term->number[0] * load / sqrt(slip2 + term->number[1] * term->number[1]);
+    mjtNum force[3] = {scale * v[0], scale * v[1], scale * v[2]}, back[3] = {-force[0], -force[1], -force[2]};
+    mjtNum none[3] = {0, 0, 0};
+    apply_ft(m, d, force, none, c->pos, b, d->qfrc_passive);
+    apply_ft(m, d, back, none, c->pos, a, d->qfrc_passive);
+  }
+}
+
+// --- what MuJoCo calls --------------------------------------------------------------------------------------------------
+
+void compass_passive(const mjModel* m, mjData* d) {
+  const Program* program = entries[slot_of(m)].program;
+  if (!program) return;
+  for (int64_t i = 0; i < program->n; i++) {
+    const Term* term = program->term + i;
+    if (term->kind == RATE_RESTITUTION) rate_dependent_restitution(m, d, term);
+    else if (term->kind == TANGENTIAL) tangential_impulse(m, d, term);
+    else push(m, d, term);
+  }
+}
