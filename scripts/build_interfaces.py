@@ -1,8 +1,8 @@
-"""Build the package `compass_interfaces` from the ROS wheels of this environment and install it into this environment.
+"""Build the package `compass_interfaces` from the ROS wheels of this environment and install it there.
 
-Run with the environment's Python. Needs cmake and gcc. The package is compiled as on a robot (ament_cmake, rosidl), then
-packed as a wheel whose libraries land in the environment's `lib/` and `share/`, where the loader and the ament index
-look: the interfaces then need no environment variable. Does nothing when what is installed was built from these sources.
+Run with the environment's Python. Needs cmake and gcc. The package is compiled as on a robot (ament_cmake, rosidl),
+then packed as a wheel whose libraries land in the environment's `lib/` and `share/`, where the loader and the ament
+index look: the interfaces then need no environment variable. Does nothing when these sources are installed already.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
-import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+from xml.etree import ElementTree
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCES = ROOT / "msg_schemas"
@@ -26,10 +26,10 @@ MARK = Path("share") / NAME / "sources.sha256"
 
 
 def fingerprint() -> str:
-    """Hash of everything that the built package depends on: the sources, this script, the Python it is built for."""
+    """Hash of everything that the built package depends on: the sources and the Python it is built for."""
     digest = hashlib.sha256(sys.version.encode())
     files = sorted(path for path in SOURCES.rglob("*") if path.is_file())
-    for path in (*files, Path(__file__), ROOT / "scripts" / "wheel_targets.cmake"):
+    for path in (*files, ROOT / "scripts" / "wheel_targets.cmake"):
         digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
 
@@ -46,9 +46,10 @@ def compile_package(build: Path, stage: Path) -> None:
     ]  # fmt: skip
     jobs = str(os.cpu_count() or 1)
     for command in (configure, ["cmake", "--build", str(build), "-j", jobs], ["cmake", "--install", str(build)]):
-        done = subprocess.run(command, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        done = subprocess.run(command, check=False, env=environment, text=True, capture_output=True)
         if done.returncode:
-            raise SystemExit(f"{done.stdout}\n{' '.join(command)}: failed with status {done.returncode}")
+            output = done.stdout + done.stderr
+            raise SystemExit(f"{output}\n{' '.join(command)}: failed with status {done.returncode}")
 
 
 def pack_wheel(stage: Path, tree: Path) -> Path:

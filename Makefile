@@ -1,0 +1,63 @@
+# Everything from a fresh clone, on a machine with Python 3.11, gcc, cmake and make. What is already there is skipped.
+#
+#   make demo    the main job: a virtual robot cell plays shots, and the calibrator finds what is wrong with the simulator
+#   make test    ruff, mypy, all tests
+#   make lint | bench | lock | clean
+#
+# ARGS are handed on:  make demo ARGS="--shots 20"
+
+PYTHON ?= python3.11
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMPS := $(VENV)/.stamps
+
+# No display is needed anywhere; MuJoCo and robosuite must not look for one.
+export MUJOCO_GL ?= disable
+
+SHARED := $(shell find resource config launch -type f -o -type l)
+NATIVE := $(wildcard compass_ros/simulation/native/*.c)
+
+.PHONY: demo test lint bench install interfaces lock clean
+.DELETE_ON_ERROR:
+
+demo: install
+	$(BIN)/compass demo $(ARGS)
+
+test: lint
+	$(BIN)/python -m pytest -n 2 -m "not ros" $(ARGS)
+	$(BIN)/python -m pytest -m ros $(ARGS)
+
+lint: install
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+bench: install
+	$(BIN)/compass bench $(ARGS)
+
+install: $(STAMPS)/package interfaces
+
+# The script compares what is installed with the sources by content.
+interfaces: $(STAMPS)/locked
+	@$(BIN)/python scripts/build_interfaces.py
+
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV)
+
+$(STAMPS)/locked: requirements.lock | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
+	@mkdir -p $(STAMPS) && touch $@
+
+# Editable, so that the sources are what runs. An editable install compiles the native library beside its source, but
+# carries no data files; the second command puts those where `ros2 run` looks.
+$(STAMPS)/package: $(STAMPS)/locked setup.py setup.cfg pyproject.toml package.xml $(SHARED) $(NATIVE)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps --editable .
+	$(BIN)/python -W ignore setup.py --quiet install_data --install-dir $(VENV)
+	@touch $@
+
+lock:
+	$(BIN)/python scripts/lock.py > requirements.lock
+
+clean:
+	rm -rf $(VENV) build install log out .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
+	rm -f compass_ros/simulation/native/*.so
+	find compass_ros test scripts examples -name __pycache__ -type d -prune -exec rm -rf {} +
