@@ -8,6 +8,7 @@
 #include <math.h>
 #include <stdint.h>
 #include <stddef.h>
+#include <string.h>
 #include <mujoco/mjdata.h>
 #include <mujoco/mjmodel.h>
 
@@ -42,6 +43,7 @@ typedef struct {
 typedef void (*ApplyFT)(const mjModel*, mjData*, const mjtNum*, const mjtNum*, const mjtNum*, int, mjtNum*);
 
 static Entry entries[TABLE];
+static int live;
 static ApplyFT apply_ft;
 
 static size_t slot_of(const mjModel* model) {
@@ -52,11 +54,14 @@ static size_t slot_of(const mjModel* model) {
 
 void compass_init(ApplyFT function) { apply_ft = function; }
 
-// Registers a program for a model, or with NULL stops using one. An entry keeps its slot, so chains stay whole.
+// Registers a program for a model, or with NULL ends that. A slot stays taken, so that chains stay whole, until no model
+// has a program; then the table is emptied.
 void compass_register(const mjModel* model, const Program* program) {
   size_t slot = slot_of(model);
+  live += (program != NULL) - (entries[slot].program != NULL);
   entries[slot].model = model;
   entries[slot].program = program;
+  if (live == 0) memset(entries, 0, sizeof(entries));
 }
 
 // --- forces on one object -----------------------------------------------------------------------------------------------

@@ -1,0 +1,5 @@
+"""Robot cells: what can be tuned, what is done, what is seen."""
+
+from compass_ros.cells.cell import Cell, load
+
+__all__ = ["Cell", "load"]

@@ -1,0 +1,57 @@
+"""What the simulator needs from a cell: model fields, start, controls and observations, all for a batch at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import mujoco
+
+from compass_ros.types import Floats, Ints
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """How the table slows a body that lies on it: Coulomb friction, faded in at a creep speed."""
+
+    body: str
+    friction: Floats
+    """(B,) coefficient."""
+    creep: Floats
+    """(B,) speed under which it fades [m/s]."""
+    load: Floats
+    """(B,) share of the weight that the table carries."""
+
+
+class Dynamics(Protocol):
+    """A cell's meaning in MuJoCo. B rollouts, P parameters, A inputs, T steps, F frames, C observed columns."""
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The compiled scene at its defaults. Never changed."""
+        ...
+
+    def apply(self, models: Sequence[mujoco.MjModel], values: Floats) -> None:
+        """Write (B, P) parameter values into B models."""
+        ...
+
+    def start(self, values: Floats, inputs: Floats) -> tuple[Floats, Floats]:
+        """(B, nq) positions and (B, nv) velocities at simulated time 0."""
+        ...
+
+    def controls(self, values: Floats, inputs: Floats, steps: int) -> Floats:
+        """(B, T, nu) controls at the scene's time step."""
+        ...
+
+    def sliding(self, values: Floats) -> tuple[Sliding, ...]:
+        """Bodies that lie on the table, with (B,) coefficients each; empty where friction is the scene's own."""
+        ...
+
+    def columns(self) -> Ints:
+        """(C,) index into qpos of each observed column."""
+        ...
+
+    def observe(self, values: Floats, positions: Floats) -> Floats:
+        """(B, F, C) what the tracker would say, from (B, F, C) raw columns of qpos."""
+        ...

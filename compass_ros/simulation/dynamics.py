@@ -1,0 +1,22 @@
+"""Which code gives a cell's YAML its meaning."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from compass_ros.cells import Cell
+from compass_ros.cells.air_hockey import AirHockey
+from compass_ros.cells.dynamics import Dynamics
+from compass_ros.errors import ConfigError, nearest
+
+DYNAMICS: dict[str, Callable[[Cell], Dynamics]] = {"air_hockey": AirHockey}
+
+
+def dynamics_of(cell: Cell) -> Dynamics:
+    """The dynamics that the cell names. Raises ConfigError with the nearest known name."""
+    name = cell.spec.dynamics
+    if name not in DYNAMICS:
+        raise ConfigError(
+            f"{cell.path}: dynamics: unknown '{name}'; known: {', '.join(DYNAMICS)}{nearest(name, DYNAMICS)}"
+        )
+    return DYNAMICS[name](cell)

@@ -1,0 +1,33 @@
+"""Friction that depends on the direction of motion.
+
+F = -N A v / |v| with A = [[along_x, diagonal], [diagonal, -along_x]], the traceless part of a friction tensor.
+Source: Zmitrowicz 2006, friction tensors of second order; the isotropic part is the ordinary coefficient.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity, creep_and_load
+from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.types import Floats
+
+
+def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
+    terms = []
+    for name in context.objects:
+        creep, load = creep_and_load(context.sliding[name])
+        terms.append(Term(Kind.ANISOTROPIC, name, np.hstack([numbers, creep, load])))
+    return tuple(terms)
+
+
+EFFECT = Effect(
+    name="anisotropic_friction",
+    channel="dynamics",
+    quantities=(
+        Quantity("along_x", "1", -0.1, 0.1, 0.005),
+        Quantity("diagonal", "1", -0.1, 0.1, 0.005),
+    ),
+    sentence="friction that depends on the direction of motion",
+    forces=_forces,
+)

@@ -1,0 +1,23 @@
+"""A clock of the sensor that runs fast or slow.
+
+observed(t) = true(t (1 + rate)). Source: rate error of a free-running clock.
+"""
+
+from __future__ import annotations
+
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity, Sample
+from compass_ros.types import Floats
+
+
+def _sensing(sample: Sample, numbers: Floats, context: Context) -> Sample:
+    return lambda time: sample(time * (1 + numbers[:, :1]))
+
+
+EFFECT = Effect(
+    name="clock_drift",
+    channel="sensing",
+    quantities=(Quantity("rate", "1", -0.1, 0.1, 0.005),),
+    sentence="a drift of the sensor's clock",
+    sensing=_sensing,
+    on="cell",
+)

@@ -1,0 +1,28 @@
+"""A steady stream of air across the table.
+
+F = m a |w - v| (w - v) / w^2 with w the velocity of the air along (a_x, a_y) and a the acceleration of a body at rest.
+Source: drag equation with the velocity relative to the air. For a fast stream it turns into a constant push, as a tilt is.
+"""
+
+from __future__ import annotations
+
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.types import Floats
+
+
+def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
+    return tuple(Term(Kind.CROSSWIND, name, numbers) for name in context.objects)
+
+
+EFFECT = Effect(
+    name="crosswind",
+    channel="dynamics",
+    quantities=(
+        Quantity("acceleration_x", "m/s^2", -0.5, 0.5, 0.03),
+        Quantity("acceleration_y", "m/s^2", -0.5, 0.5, 0.03),
+        Quantity("speed", "m/s", 0.3, 10.0, 1.0, amplitude=False, start=1.5),
+    ),
+    sentence="a steady stream of air across the table",
+    forces=_forces,
+)

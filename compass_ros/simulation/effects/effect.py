@@ -1,0 +1,68 @@
+"""What an effect is: a piece of physics that a simulator may lack, with hooks at the places where it can act."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import mujoco
+
+from compass_ros.cells.dynamics import Sliding
+from compass_ros.simulation.native.program import Term
+from compass_ros.types import Channel, Floats
+
+Sample = Callable[[Floats], Floats]
+"""(B, F) times [s] -> (B, F, C) observed columns; what a perfect sensor would say at those times."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One number of an effect. At zero of all amplitudes the effect is absent."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    scale: float
+    """A modest size: the step of searches and the width of the prior."""
+    amplitude: bool = True
+    """False for shapes (a centre, a radius, a frequency), which mean nothing while the amplitudes are zero."""
+    start: float = 0.0
+    """Where a search begins; for shapes."""
+
+
+@dataclass(frozen=True)
+class Context:
+    """What the cell knows of itself, for hooks. Columns: of an observation; pairs (x, y) in the plane."""
+
+    objects: tuple[str, ...]
+    """Bodies or joints that the effect acts on."""
+    sliding: Mapping[str, Sliding]
+    planes: tuple[tuple[int, int], ...]
+    positions: tuple[int, ...]
+    """Columns that are positions (or joint positions), in metres or radians."""
+    time_step: float
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A named effect. Numbers come as (B, q) in the order of `quantities`; B rollouts, F frames, T steps, C columns."""
+
+    name: str
+    channel: Channel
+    quantities: tuple[Quantity, ...]
+    sentence: str
+    """What the simulator lacks, as in 'the simulator lacks ...'."""
+    forces: Callable[[Floats, Context], tuple[Term, ...]] | None = None
+    model: Callable[[mujoco.MjModel, Floats, Context], None] | None = None
+    """Changes one model, given (q,) numbers; what it changes must be among RESTORED in simulator.py."""
+    controls: Callable[[Floats, Floats, Context], Floats] | None = None
+    """(B, T, nu) velocity commands -> the same as the arm follows them."""
+    sensing: Callable[[Sample, Floats, Context], Sample] | None = None
+    on: str = "objects"
+    """What it acts on: `objects` (all that are tracked, or some), `walls` (one fixed geom of the scene), `cell`."""
+
+
+def creep_and_load(sliding: Sliding) -> tuple[Floats, Floats]:
+    """The two columns that every friction force needs: creep speed [m/s] and share of the weight on the table."""
+    return sliding.creep[:, None], sliding.load[:, None]

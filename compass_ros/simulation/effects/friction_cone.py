@@ -1,0 +1,26 @@
+"""Another model of contact friction: MuJoCo's pyramid instead of its elliptic cone, or the reverse.
+
+A choice, not a number: at 0.5 or more the other cone is used. Source: MuJoCo documentation, "Computation", friction cones.
+"""
+
+from __future__ import annotations
+
+import mujoco
+
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.types import Floats
+
+
+def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
+    if numbers[0] >= 0.5:
+        model.opt.cone = 1 - model.opt.cone
+
+
+EFFECT = Effect(
+    name="friction_cone",
+    channel="contact",
+    quantities=(Quantity("other", "1", 0.0, 1.0, 1.0),),
+    sentence="the other friction cone in contacts",
+    model=_model,
+    on="cell",
+)

@@ -1,0 +1,35 @@
+"""A patch with other friction.
+
+F = -extra N v / |v| inside `radius`, with a soft edge 1 / (1 + exp(10 (r / radius - 1))); N is the load on the table.
+Source: Coulomb friction with a coefficient that depends on the place.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity, creep_and_load
+from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.types import Floats
+
+
+def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
+    terms = []
+    for name in context.objects:
+        creep, load = creep_and_load(context.sliding[name])
+        terms.append(Term(Kind.FRICTION_PATCH, name, np.hstack([numbers, creep, load])))
+    return tuple(terms)
+
+
+EFFECT = Effect(
+    name="friction_patch",
+    channel="dynamics",
+    quantities=(
+        Quantity("extra", "1", -0.15, 0.6, 0.02),
+        Quantity("centre_x", "m", -0.45, 0.45, 0.05, amplitude=False, start=0.0),
+        Quantity("centre_y", "m", -0.225, 0.225, 0.05, amplitude=False, start=0.0),
+        Quantity("radius", "m", 0.03, 0.3, 0.03, amplitude=False, start=0.1),
+    ),
+    sentence="a patch with other friction",
+    forces=_forces,
+)

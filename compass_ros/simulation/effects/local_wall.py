@@ -1,0 +1,34 @@
+"""One wall that stands elsewhere or is softer than the others.
+
+The geom moves by `offset` along its outward normal (a box: along its thinner side); the stiffness of its contacts is
+multiplied by exp(softness). Source: geometry and the direct solref format of MuJoCo.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.types import Floats
+
+
+def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
+    offset, softness = numbers
+    geom = model.geom(context.objects[0]).id
+    axes = np.zeros(9)
+    mujoco.mju_quat2Mat(axes, model.geom_quat[geom])
+    normal = axes.reshape(3, 3)[:, 2 if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE else 0]
+    model.geom_pos[geom] -= offset * normal
+    pairs = (model.pair_geom1 == geom) | (model.pair_geom2 == geom)
+    model.pair_solref[pairs, 0] *= np.exp(softness)
+
+
+EFFECT = Effect(
+    name="local_wall",
+    channel="contact",
+    quantities=(Quantity("offset", "m", -0.03, 0.03, 0.002), Quantity("softness", "1", -2.5, 1.0, 0.2)),
+    sentence="that one wall stands elsewhere or is softer",
+    model=_model,
+    on="walls",
+)

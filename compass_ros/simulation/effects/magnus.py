@@ -1,0 +1,24 @@
+"""A push across the motion, as on a spinning body.
+
+F = m rate (-v_y, v_x), for a spin that stays the same over an episode.
+Source: Magnus force, proportional to spin times speed (Kutta-Joukowski); `rate` holds spin and air density.
+"""
+
+from __future__ import annotations
+
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.types import Floats
+
+
+def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
+    return tuple(Term(Kind.MAGNUS, name, numbers) for name in context.objects)
+
+
+EFFECT = Effect(
+    name="magnus",
+    channel="dynamics",
+    quantities=(Quantity("rate", "1/s", -2.0, 2.0, 0.05),),
+    sentence="a push across the motion (Magnus force)",
+    forces=_forces,
+)

@@ -1,0 +1,34 @@
+"""Friction that pulsates in time, as under a fan that hunts.
+
+F = -(cosine cos(2 pi f t) + sine sin(2 pi f t)) N v / |v|, t since the command.
+Source: Coulomb friction under a load that oscillates; only a phase that is the same in each episode can be found.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity, creep_and_load
+from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.types import Floats
+
+
+def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
+    terms = []
+    for name in context.objects:
+        creep, load = creep_and_load(context.sliding[name])
+        terms.append(Term(Kind.PULSATING, name, np.hstack([numbers[:, :2], creep, load, numbers[:, 2:]])))
+    return tuple(terms)
+
+
+EFFECT = Effect(
+    name="pulsating_lift",
+    channel="dynamics",
+    quantities=(
+        Quantity("cosine", "1", -0.1, 0.1, 0.01),
+        Quantity("sine", "1", -0.1, 0.1, 0.01),
+        Quantity("frequency", "Hz", 0.2, 6.0, 0.3, amplitude=False, start=1.0),
+    ),
+    sentence="a pulsation of the lift",
+    forces=_forces,
+)

@@ -1,0 +1,25 @@
+"""Restitution that falls with the speed of impact.
+
+A contact's damping grows by the factor 1 + slope |v_n|, v_n the speed along the normal at each moment.
+Source: first order of a damping that depends on speed, as in Hunt and Crossley 1975.
+"""
+
+from __future__ import annotations
+
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.types import Floats
+
+
+def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
+    return (Term(Kind.RATE_RESTITUTION, "", numbers),)
+
+
+EFFECT = Effect(
+    name="rate_dependent_restitution",
+    channel="contact",
+    quantities=(Quantity("slope", "s/m", -0.8, 20.0, 0.5),),
+    sentence="a restitution that depends on the speed of impact",
+    forces=_forces,
+    on="cell",
+)

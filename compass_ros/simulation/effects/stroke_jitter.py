@@ -1,0 +1,26 @@
+"""Pushes that vary in speed from one episode to the next.
+
+u -> u (1 + deviation), the deviation of this episode drawn with the standard deviation that is the effect's size; what a
+rollout is given is the episode's own deviation. Source: random effect on the launch.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.types import Floats
+
+
+def _controls(controls: Floats, numbers: Floats, context: Context) -> Floats:
+    return np.asarray(controls * (1 + numbers[:, None, :1]))
+
+
+EFFECT = Effect(
+    name="stroke_jitter",
+    channel="actuation",
+    quantities=(Quantity("deviation", "1", -0.3, 0.3, 0.01),),
+    sentence="a scatter of the pushing speed",
+    controls=_controls,
+    on="cell",
+)
