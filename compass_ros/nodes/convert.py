@@ -1,0 +1,167 @@
+"""Messages from the suite's own data: one function a message, no decisions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from statistics import fmean
+from typing import Any
+
+from compass_interfaces.msg import (
+    CalibrationStatus,
+    CausalGraph,
+    Effect,
+    EffectParameter,
+    Gap,
+    Mismatch,
+    SimParameter,
+    SimParameters,
+)
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from std_msgs.msg import Header
+
+from compass_ros.nodes.job import Step
+
+Json = Mapping[str, Any]
+"""A part of result.json, whose JSON Schema has been checked when it was written."""
+
+MODELS = ("nominal", "calibrated", "with_effects")
+EPISODES = ("fit", "held_out")
+
+
+def number(value: float | None) -> float:
+    """JSON has no NaN; null stands for a number that is not defined."""
+    return math.nan if value is None else float(value)
+
+
+def parameters_message(result: Json, header: Header, source: str) -> SimParameters:
+    """The calibrated parameters; `source` is the path of the result.json."""
+    rows = [
+        SimParameter(
+            name=row["name"], unit=row["unit"], default_value=number(row["default"]), value=number(row["value"]),
+            std=number(row["std"]), lower=number(row["bounds"][0]), upper=number(row["bounds"][1]),
+            active=row["active"], identifiable=row["identifiable"],
+        )
+        for row in result["parameters"]
+    ]  # fmt: skip
+    return SimParameters(header=header, cell=result["cell"], source=source, parameters=rows)
+
+
+def graph_message(result: Json, header: Header) -> CausalGraph:
+    """The causal graph, its matrix in rows of parameters."""
+    graph = result["graph"]
+    return CausalGraph(
+        header=header,
+        parameters=graph["parameters"],
+        factors=graph["factors"],
+        psi=[float(value) for row in graph["psi"] for value in row],
+        threshold=float(graph["threshold"]),
+        sparsity=float(graph["sparsity"]),
+    )
+
+
+def mismatch_message(result: Json, header: Header) -> Mismatch:
+    """What is left after the calibration."""
+    mismatch = result["mismatch"]
+    where = mismatch["where"] or {}
+    region = where.get("region") or {}
+    return Mismatch(
+        header=header,
+        verdict=mismatch["verdict"],
+        object=where.get("object", ""),
+        phase=where.get("phase", ""),
+        channel=where.get("channel", ""),
+        has_region=bool(region),
+        region_centre_m=[float(value) for value in region.get("centre_m", (0, 0))],
+        region_radius_m=float(region.get("radius_m", 0)),
+        time_s=[float(value) for value in where.get("time_s") or ()],
+        effects=[effect_message(effect) for effect in mismatch["effects"]],
+        undetectable=mismatch["undetectable"],
+        next_experiment=mismatch["next_experiment"] or "",
+        sentence=mismatch["sentence"],
+        gaps=gap_messages(result["gap"]),
+        noise_floor_m=number(result["gap"]["noise_floor_m"]),
+    )
+
+
+def effect_message(effect: Json) -> Effect:
+    """One fitted effect with its evidence."""
+    evidence = effect["evidence"]
+    return Effect(
+        name=effect["name"],
+        parameters=[
+            EffectParameter(name=name, value=number(one["value"]), std=number(one["std"]), unit=one["unit"])
+            for name, one in effect["parameters"].items()
+        ],
+        held_out_gain=number(evidence["held_out_gain"]),
+        log_evidence=number(evidence["log_evidence"]),
+        false_alarm_p=number(evidence["false_alarm_p"]),
+        equivalents=effect["equivalents"],
+    )
+
+
+def gap_messages(gap: Json) -> list[Gap]:
+    """One message for each model and set of episodes that the result has."""
+    return [
+        Gap(
+            model=model,
+            episodes=episodes,
+            factors=list(one["d"]),
+            d=[number(value) for value in one["d"].values()],
+            rmse_m=number(one["rmse_m"]),
+        )
+        for model in MODELS
+        for episodes in EPISODES
+        if (one := (gap.get(model) or {}).get(episodes))
+    ]
+
+
+def mean_gap(result: Json, model: str) -> float:
+    """Mean trajectory difference over the factors [m], on held-out episodes where there are any, else on the fitted."""
+    gap = result["gap"][model]
+    found = gap.get("held_out") or gap["fit"]
+    return fmean(number(value) for value in found["d"].values())
+
+
+def status_message(state: int, header: Header, step: Step | None = None, message: str = "") -> CalibrationStatus:
+    """What the calibrator does now; `step` while it runs."""
+    status = CalibrationStatus(header=header, state=state, message=message)
+    status.gap_m = status.sparsity = status.seconds_left = math.nan
+    if step is not None:
+        status.stage = step.progress.stage
+        status.iteration = step.progress.iteration
+        status.gap_m = step.progress.gap
+        status.sparsity = step.progress.sparsity
+        status.share_done = step.progress.done
+        status.seconds_left = step.seconds_left
+    return status
+
+
+WORDS = {
+    CalibrationStatus.IDLE: (DiagnosticStatus.OK, "idle"),
+    CalibrationStatus.RUNNING: (DiagnosticStatus.OK, "running"),
+    CalibrationStatus.SUCCEEDED: (DiagnosticStatus.OK, "succeeded"),
+    CalibrationStatus.FAILED: (DiagnosticStatus.ERROR, "failed"),
+    CalibrationStatus.CANCELLED: (DiagnosticStatus.WARN, "cancelled"),
+}
+"""Level and word of each state of the calibrator."""
+
+
+def status_diagnostics(status: CalibrationStatus, node: str, header: Header) -> DiagnosticArray:
+    """The same for /diagnostics."""
+    level, word = WORDS[status.state]
+    values = {
+        "stage": status.stage,
+        "iteration": str(status.iteration),
+        "trajectory difference [m]": f"{status.gap_m:.4g}",
+        "sparsity": f"{status.sparsity:.3f}",
+        "share done": f"{status.share_done:.3f}",
+        "seconds left": f"{status.seconds_left:.0f}",
+    }
+    one = DiagnosticStatus(
+        level=level,
+        name=f"{node}: calibration",
+        message=f"{word}: {status.message}" if status.message else word,
+        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+    )
+    return DiagnosticArray(header=header, status=[one])

@@ -1,0 +1,165 @@
+"""One calibration in a process of its own, so that the node stays free and a cancel takes effect at once.
+
+The process is the command line itself (`compass calibrate --progress json`): what the node finds is what the command
+finds. It writes into a folder beside the output, which takes the output's name only when everything is there.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from queue import SimpleQueue
+from typing import IO
+
+from compass_ros.errors import ConfigError
+from compass_ros.types import Progress
+
+
+class Outcome(Enum):
+    """How a calibration ended."""
+
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to calibrate from."""
+
+    bags: tuple[str, ...]
+    cell: str
+    """Name of a cell, or path of its YAML."""
+    seed: int
+    rollouts: int
+    """Budget of simulated rollouts; 0: the method's default."""
+    output: Path
+    """Folder of the result. It is made, or replaced where it holds an earlier result; nothing else is overwritten."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """Progress, and how long the rest will take."""
+
+    progress: Progress
+    seconds_left: float
+    """[s], from the share done so far; NaN while nothing is done."""
+
+
+def command(request: Request, folder: Path) -> list[str]:
+    """The command line that does the work and leaves its result in `folder`."""
+    words = [sys.executable, "-m", "compass_ros.cli", "calibrate", "--cell", request.cell, "--out", str(folder)]
+    words += ["--seed", str(request.seed), "--progress", "json"]
+    if request.rollouts:
+        words += ["--rollouts", str(request.rollouts)]
+    return [*words, *request.bags]
+
+
+def prepare(output: Path) -> Path:
+    """A hidden folder beside `output`, on the same disk. Raises ConfigError where the result could not be put."""
+    empty = output.is_dir() and not any(output.iterdir())
+    if output.exists() and not empty and not (output / "result.json").is_file():
+        raise ConfigError(f"output: {output} exists and holds no earlier calibration; it is not overwritten")
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        return Path(tempfile.mkdtemp(prefix=f".{output.name}-", dir=output.parent))
+    except OSError as error:
+        raise ConfigError(f"output: {output} cannot be written: {error.strerror}") from error
+
+
+def read_step(line: bytes, elapsed_s: float) -> Step:
+    """One line of `--progress json`, `elapsed_s` [s] after the start; null stands for a number that is not defined."""
+    content = json.loads(line)
+    gap, sparsity = (math.nan if content[key] is None else float(content[key]) for key in ("gap", "sparsity"))
+    progress = Progress(content["stage"], int(content["iteration"]), float(content["done"]), gap, sparsity)
+    left = elapsed_s * (1 - progress.done) / progress.done if progress.done > 0 else math.nan
+    return Step(progress, left)
+
+
+class Job:
+    """A running calibration. `finished` is set when `outcome` and `message` are final."""
+
+    def __init__(self, words: Sequence[str], folder: Path, result: Path, output: Path) -> None:
+        """Start `words`, which leave their result in the folder `result` inside `folder`; it becomes `output`."""
+        self.finished = threading.Event()
+        self.outcome = Outcome.FAILED
+        self.message = ""
+        self.output = output
+        self._folder = folder
+        self._result = result
+        self._steps: SimpleQueue[Step] = SimpleQueue()
+        self._decision = threading.Lock()  # a cancel and a successful end exclude each other
+        self._cancelled = False
+        self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  closed by the thread below
+        self._started = time.monotonic()
+        # A session of its own: the terminal's Ctrl-C reaches the node alone, and the whole group can be ended.
+        self._process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=self._errors, start_new_session=True)
+        threading.Thread(target=self._follow, name="calibration").start()
+
+    @classmethod
+    def start(cls, request: Request) -> Job:
+        """Raises ConfigError where the output cannot be written."""
+        output = request.output.expanduser().absolute()
+        folder = prepare(output)
+        return cls(command(request, folder / "result"), folder, folder / "result", output)
+
+    def steps(self) -> list[Step]:
+        """Progress since the last call, oldest first."""
+        found = []
+        while not self._steps.empty():  # there is one reader
+            found.append(self._steps.get())
+        return found
+
+    def cancel(self) -> None:
+        """End the calibration now; nothing of it stays. No effect when it has ended."""
+        with self._decision:
+            if self._cancelled or self.finished.is_set() or self._process.poll() is not None:
+                return
+            self._cancelled = True
+            os.killpg(self._process.pid, signal.SIGKILL)
+
+    def _follow(self) -> None:
+        with self._errors, self._process as process:
+            error = self._read(process.stdout) if process.stdout else ""
+            if error:
+                os.killpg(process.pid, signal.SIGKILL)
+            status = process.wait()
+            self._errors.seek(0)
+            said = self._errors.read().decode(errors="replace").strip().splitlines()
+        with self._decision:
+            self.outcome, self.message = self._end(status, error or (said[-1] if said else "it said nothing"))
+            shutil.rmtree(self._folder)
+            self.finished.set()
+
+    def _read(self, lines: IO[bytes]) -> str:
+        """Progress until the process closes its output; or a sentence about a line that is no progress."""
+        for line in lines:
+            try:
+                self._steps.put(read_step(line, time.monotonic() - self._started))
+            except (ValueError, KeyError, TypeError):
+                return f"expected progress as JSON, found {line!r}"
+        return ""
+
+    def _end(self, status: int, error: str) -> tuple[Outcome, str]:
+        if self._cancelled:
+            return Outcome.CANCELLED, "cancelled; nothing was written"
+        if status == 1:
+            return Outcome.FAILED, error
+        if status:
+            return Outcome.FAILED, f"the calibration process ended with status {status}: {error}"
+        if self.output.exists():
+            self.output.rename(self._folder / "earlier")
+        self._result.rename(self.output)
+        return Outcome.SUCCEEDED, f"result in {self.output}"

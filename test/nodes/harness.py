@@ -1,0 +1,134 @@
+"""Nodes as separate processes, and a client that talks to them over DDS like any other participant."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from rclpy.action import ActionClient
+from rclpy.client import Client
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
+from rclpy.task import Future
+
+Message = TypeVar("Message")
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=ReliabilityPolicy.RELIABLE)
+RELIABLE = QoSProfile(depth=100)
+SENSOR = qos_profile_sensor_data
+
+
+def until(condition: Callable[[], bool], timeout_s: float, what: str) -> None:
+    """Wait for a condition; fail with a sentence."""
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline, f"waited {timeout_s} s for {what}"
+        time.sleep(0.01)
+
+
+class NodeProcess:
+    """A node of the suite in a process of its own."""
+
+    def __init__(self, name: str, folder: Path, parameters: Mapping[str, Any], arguments: tuple[str, ...]) -> None:
+        """`name`: module in compass_ros.nodes; `parameters`: as in a parameter file; `arguments`: after --ros-args."""
+        self.name = name
+        self._log = folder / f"{name}.log"
+        file = folder / f"{name}.yaml"
+        file.write_text(yaml.safe_dump({"/**": {"ros__parameters": dict(parameters)}}))
+        words = [sys.executable, "-m", f"compass_ros.nodes.{name}", "--ros-args"]
+        words += ["--params-file", str(file)] if parameters else []
+        with self._log.open("wb") as log:
+            self.process = subprocess.Popen(
+                [*words, *arguments], stdout=log, stderr=subprocess.STDOUT, cwd=folder, start_new_session=True
+            )
+
+    def output(self) -> str:
+        """All that it printed and logged."""
+        return self._log.read_text(errors="replace")
+
+    def stop(self, by: signal.Signals = signal.SIGINT, timeout_s: float = 5.0) -> int:
+        """Ask it to end, as Ctrl-C does; its exit status."""
+        self.process.send_signal(by)
+        return self.process.wait(timeout_s)
+
+    def kill(self) -> None:
+        """End it at once, with all that it started in its group."""
+        if self.process.poll() is None:
+            os.killpg(self.process.pid, signal.SIGKILL)
+            self.process.wait(5)
+
+
+class Probe:
+    """A node of the test's own, spun by a thread; what it hears is kept."""
+
+    def __init__(self, domain: int) -> None:
+        self._context = Context()
+        self._context.init(domain_id=domain)
+        self.node = Node("probe", context=self._context, enable_rosout=False, start_parameter_services=False)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._spin, name="probe")
+        self._thread.start()
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except ExternalShutdownException:
+            return  # the test has ended
+
+    def close(self) -> None:
+        self._context.try_shutdown()
+        self._thread.join()
+        self._executor.shutdown()
+        self.node.destroy_node()
+
+    def listen(
+        self, kind: type[Message], topic: str, qos: QoSProfile = RELIABLE, connect: bool = True
+    ) -> list[Message]:
+        """A list that grows with every message; returns once a publisher is there, unless `connect` is False."""
+        heard: list[Message] = []
+        self.node.create_subscription(kind, topic, heard.append, qos)
+        if connect:
+            until(lambda: self.node.count_publishers(topic) > 0, 10, f"a publisher of {topic}")
+        return heard
+
+    def wait_for(
+        self, heard: list[Message], where: Callable[[Message], bool] = lambda _: True, timeout_s: float = 10
+    ) -> Message:
+        """The first message in a list of `listen` that fulfils `where`, now or later."""
+        until(lambda: any(where(message) for message in heard), timeout_s, f"a message; heard {len(heard)}")
+        return next(message for message in heard if where(message))
+
+    def publisher(self, kind: type[Message], topic: str, qos: QoSProfile = RELIABLE) -> Callable[[Message], None]:
+        """A function that publishes; returns once a subscriber is there."""
+        publisher = self.node.create_publisher(kind, topic, qos)
+        until(lambda: publisher.get_subscription_count() > 0, 10, f"a subscriber of {topic}")
+        publish: Callable[[Message], None] = publisher.publish
+        return publish
+
+    def call(self, kind: Any, service: str, request: Any = None, timeout_s: float = 10) -> Any:
+        """The response of a service."""
+        client: Client = self.node.create_client(kind, service)
+        assert client.wait_for_service(timeout_s), f"no service {service}"
+        return self.result(client.call_async(request or kind.Request()), timeout_s)
+
+    def action(self, kind: Any, name: str, timeout_s: float = 10) -> ActionClient:
+        """A client of an action; returns once the server is there."""
+        client = ActionClient(self.node, kind, name)
+        assert client.wait_for_server(timeout_s), f"no action {name}"
+        return client
+
+    def result(self, future: Future, timeout_s: float = 10) -> Any:
+        """What a future holds, once it does."""
+        until(future.done, timeout_s, "an answer")
+        return future.result()
