@@ -43,19 +43,19 @@ class Calibrator(Node):
         super().__init__("calibrator")
         self._declare()
         self._recorded: list[str] = []
-        self._job: Job | None = None
+        self._running: Job | None = None
         self._claim = threading.Lock()
 
-        self._parameters = self.create_publisher(SimParameters, "~/sim_parameters", LATCHED)
-        self._graph = self.create_publisher(CausalGraph, "~/causal_graph", LATCHED)
-        self._mismatch = self.create_publisher(Mismatch, "~/mismatch", LATCHED)
+        self._parameters_topic = self.create_publisher(SimParameters, "~/sim_parameters", LATCHED)
+        self._graph_topic = self.create_publisher(CausalGraph, "~/causal_graph", LATCHED)
+        self._mismatch_topic = self.create_publisher(Mismatch, "~/mismatch", LATCHED)
         self._status_topic = self.create_publisher(CalibrationStatus, "~/status", LATCHED)
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._diagnostics_topic = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._status = CalibrationStatus()
         self._say(convert.status_message(CalibrationStatus.IDLE, self._header()))
 
         self.create_subscription(EpisodeInfo, "recorder/status", self._on_episode, 100)
-        self._server = ActionServer(
+        self._action_server = ActionServer(
             self,
             Calibrate,
             "~/calibrate",
@@ -63,10 +63,10 @@ class Calibrator(Node):
             cancel_callback=lambda _: CancelResponse.ACCEPT,
             callback_group=ReentrantCallbackGroup(),
         )
-        self._client = ActionClient(self, Calibrate, "~/calibrate")
+        self._own_client = ActionClient(self, Calibrate, "~/calibrate")
         self.create_service(Trigger, "~/recalibrate", self._on_recalibrate)
         self.create_timer(1.0, self._diagnose)
-        self._start = self.create_timer(0.1, self._on_start)
+        self._start_timer = self.create_timer(0.1, self._on_start)
 
     def _declare(self) -> None:
         def describe(text: str, **extra: object) -> ParameterDescriptor:
@@ -84,8 +84,8 @@ class Calibrator(Node):
         self.declare_parameter("output", "out/calibration", describe(output))
         self.declare_parameter("autostart", True, describe("calibrate when the node starts, if `bags` names any"))
 
-    def _header(self) -> Header:
-        return Header(stamp=self.get_clock().now().to_msg(), frame_id="table")
+    def _header(self, frame: str = "") -> Header:
+        return Header(stamp=self.get_clock().now().to_msg(), frame_id=frame)
 
     def _bags(self) -> tuple[str, ...]:
         value = self.get_parameter("bags").value
@@ -111,12 +111,12 @@ class Calibrator(Node):
         """Raises ConfigError when a calibration is running, or when this one cannot start."""
         with self._claim:
             self._refuse_a_second()
-            self._job = Job.start(self._request(goal))
+            self._running = Job.start(self._request(goal))
             self._say(convert.status_message(CalibrationStatus.RUNNING, self._header()))
-            return self._job
+            return self._running
 
     def _refuse_a_second(self) -> None:
-        if self._job is not None:
+        if self._running is not None:
             raise ConfigError(f"refused: a calibration is already running ({self._status.share_done:.0%} done)")
 
     def _execute(self, handle: ServerGoalHandle) -> Calibrate.Result:
@@ -129,7 +129,7 @@ class Calibrator(Node):
         try:
             self._follow(job, handle)
         finally:
-            self._job = None
+            self._running = None
         self._say(convert.status_message(STATES[job.outcome], self._header(), message=job.message))
         if job.outcome is Outcome.SUCCEEDED:
             handle.succeed()
@@ -157,10 +157,10 @@ class Calibrator(Node):
     def _publish(self, path: Path, message: str) -> Calibrate.Result:
         """The result as topics and as the action's answer."""
         result = json.loads(path.read_text(encoding="utf-8"))
-        header = self._header()
-        self._parameters.publish(convert.parameters_message(result, header, str(path)))
-        self._graph.publish(convert.graph_message(result, header))
-        self._mismatch.publish(convert.mismatch_message(result, header))
+        header = self._header("table")
+        self._parameters_topic.publish(convert.parameters_message(result, header, str(path)))
+        self._graph_topic.publish(convert.graph_message(result, header))
+        self._mismatch_topic.publish(convert.mismatch_message(result, header))
         return Calibrate.Result(
             success=True,
             message=message,
@@ -179,7 +179,7 @@ class Calibrator(Node):
         self._status_topic.publish(status)
 
     def _diagnose(self) -> None:
-        self._diagnostics.publish(convert.status_diagnostics(self._status, self.get_name(), self._header()))
+        self._diagnostics_topic.publish(convert.status_diagnostics(self._status, self.get_name(), self._header()))
 
     def _on_episode(self, info: EpisodeInfo) -> None:
         """A finished episode of our cell joins what the next calibration without named bags reads."""
@@ -189,11 +189,11 @@ class Calibrator(Node):
 
     def _on_start(self) -> None:
         """Once, as soon as our own action server is there."""
-        if not self._client.server_is_ready():
+        if not self._own_client.server_is_ready():
             return
-        self._start.cancel()
+        self._start_timer.cancel()
         if self.get_parameter("autostart").value and self.get_parameter("bags").value:
-            self._client.send_goal_async(Calibrate.Goal())
+            self._own_client.send_goal_async(Calibrate.Goal())
 
     def _on_recalibrate(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
@@ -202,7 +202,7 @@ class Calibrator(Node):
         except CompassError as error:
             response.message = str(error)
             return response
-        self._client.send_goal_async(Calibrate.Goal())
+        self._own_client.send_goal_async(Calibrate.Goal())
         response.success, response.message = True, f"calibrating from {len(request.bags)} bags"
         return response
 
