@@ -1,0 +1,33 @@
+"""MCAP bag <-> Episode: crash-safe writing, recovery, reading of anybody's bags, import of tables.
+
+The bag is the only hand-over from a live cell to a calibration. One bag holds one episode.
+"""
+
+from compass_ros.episodes.episode_writer import write_episode
+from compass_ros.episodes.reader import (
+    BagContent,
+    TopicSummary,
+    find_bags,
+    list_topics,
+    read_bag,
+    read_episode,
+    read_episodes,
+)
+from compass_ros.episodes.recovery import Recovery, recover, unfinished
+from compass_ros.episodes.sources import Source, default_sources
+
+__all__ = [
+    "BagContent",
+    "Recovery",
+    "Source",
+    "TopicSummary",
+    "default_sources",
+    "find_bags",
+    "list_topics",
+    "read_bag",
+    "read_episode",
+    "read_episodes",
+    "recover",
+    "unfinished",
+    "write_episode",
+]

@@ -1,0 +1,134 @@
+"""metadata.yaml of a rosbag2 bag, version 9: written last and at once; its presence says that the bag is whole."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from compass_ros.errors import BagError
+
+FILE_NAME = "metadata.yaml"
+_LARGEST = 16 * 2**20
+
+
+@dataclass(frozen=True)
+class TopicCount:
+    """One topic of a bag, as its metadata states it."""
+
+    name: str
+    type: str
+    digest: str
+    """Type hash, `RIHS01_...`; empty when not stated."""
+    messages: int
+    qos: str = ""
+    """The publishers' QoS profiles as a YAML list; empty when not known."""
+
+
+@dataclass(frozen=True)
+class BagSummary:
+    """What metadata.yaml says of a bag. Times are log times [ns]."""
+
+    storage: str
+    files: tuple[str, ...]
+    start_ns: int
+    duration_ns: int
+    messages: int
+    topics: tuple[TopicCount, ...]
+    compression: str = ""
+
+
+def summary_text(summary: BagSummary) -> str:
+    """The YAML of rosbag2 version 9 (Jazzy) for a bag."""
+    content = {"rosbag2_bagfile_information": _content(summary)}
+    return yaml.dump(content, Dumper=_PlainDumper, sort_keys=False, width=1000)
+
+
+def write_summary(folder: Path, summary: BagSummary) -> None:
+    """Write metadata.yaml in one step: a temporary file beside it, renamed when it is complete. Raises OSError."""
+    temporary = folder / (FILE_NAME + ".tmp")
+    with temporary.open("w", encoding="utf-8") as file:
+        file.write(summary_text(summary))
+        file.flush()
+        os.fsync(file.fileno())
+    temporary.replace(folder / FILE_NAME)
+
+
+def read_summary(folder: Path) -> BagSummary:
+    """Read metadata.yaml of any rosbag2 version. Raises BagError with one line."""
+    path = folder / FILE_NAME
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise BagError(f"{path}: larger than {_LARGEST} bytes; expected a rosbag2 metadata.yaml")
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        information = content["rosbag2_bagfile_information"]
+        return BagSummary(
+            storage=str(information["storage_identifier"]),
+            files=tuple(Path(str(name)).name for name in information["relative_file_paths"]),
+            start_ns=int(information["starting_time"]["nanoseconds_since_epoch"]),
+            duration_ns=int(information["duration"]["nanoseconds"]),
+            messages=int(information["message_count"]),
+            topics=tuple(_topic(entry) for entry in information["topics_with_message_count"]),
+            compression=str(information.get("compression_mode") or "").lower().removeprefix("none"),
+        )
+    except OSError as error:
+        raise BagError(f"{path}: cannot be read: {error.strerror}") from error
+    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, RecursionError, OverflowError) as error:
+        found = " ".join(str(error).split())[:200]
+        raise BagError(f"{path}: expected a rosbag2 metadata.yaml, found {type(error).__name__}: {found}") from error
+
+
+class _PlainDumper(yaml.SafeDumper):
+    """Writes the same value twice rather than with an anchor."""
+
+    def ignore_aliases(self, data: object) -> bool:
+        return True
+
+
+def _topic(entry: Mapping[str, object]) -> TopicCount:
+    metadata = entry["topic_metadata"]
+    if not isinstance(metadata, Mapping):
+        raise TypeError("topic_metadata is not a mapping")
+    messages = entry["message_count"]
+    if not isinstance(messages, int):
+        raise TypeError("message_count is not a number")
+    digest = metadata.get("type_description_hash") or ""
+    return TopicCount(str(metadata["name"]), str(metadata["type"]), str(digest), messages)
+
+
+def _content(summary: BagSummary) -> Mapping[str, object]:
+    times = {
+        "starting_time": {"nanoseconds_since_epoch": summary.start_ns},
+        "duration": {"nanoseconds": summary.duration_ns},
+    }
+    files: Sequence[object] = [{"path": name, **times, "message_count": summary.messages} for name in summary.files]
+    return {
+        "version": 9,
+        "storage_identifier": summary.storage,
+        "duration": times["duration"],
+        "starting_time": times["starting_time"],
+        "message_count": summary.messages,
+        "topics_with_message_count": [_topic_content(topic) for topic in summary.topics],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": list(summary.files),
+        "files": files,
+        "custom_data": None,
+        "ros_distro": "jazzy",
+    }
+
+
+def _topic_content(topic: TopicCount) -> Mapping[str, object]:
+    return {
+        "topic_metadata": {
+            "name": topic.name,
+            "type": topic.type,
+            "serialization_format": "cdr",
+            "offered_qos_profiles": yaml.safe_load(topic.qos) if topic.qos else [],
+            "type_description_hash": topic.digest,
+        },
+        "message_count": topic.messages,
+    }

@@ -1,0 +1,26 @@
+"""Names of episodes, which become names of folders."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from compass_ros.errors import BagError
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
+_NUMBERED = re.compile(r"episode_(\d{4,9})")
+
+
+def episode_name(name: str) -> str:
+    """The name as it is. Raises BagError unless it is up to 100 letters, digits, `_`, `-`, `.`, and starts with one
+    of the first two."""
+    if not _NAME.fullmatch(name) or ".." in name:
+        shown = name if len(name) <= 100 else name[:100] + "..."
+        raise BagError(f"episode name {shown!r}: expected 1 to 100 letters, digits, '_', '-', '.' (no '..', no path)")
+    return name
+
+
+def next_name(taken: Iterable[str]) -> str:
+    """`episode_0001`, or one more than the highest number among the names taken."""
+    numbers = [int(match[1]) for match in map(_NUMBERED.fullmatch, taken) if match]
+    return f"episode_{max(numbers, default=0) + 1:04d}"

@@ -1,0 +1,224 @@
+"""A bag becomes an episode, or a BagError with one line: which file, what was expected, what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from compass_ros.episodes.bag import RawMessage, RawTopic, decode, is_bag, scan
+from compass_ros.episodes.definitions import EPISODE_TYPE, SHOT_TYPE, STRING_TYPE
+from compass_ros.episodes.notes import NOTES_TOPIC, SHOT_TOPIC, EpisodeHeader, Notes, Shot, header, notes, shot
+from compass_ros.episodes.sources import KNOWN_TYPES, Row, Source, rows
+from compass_ros.errors import BagError, nearest
+from compass_ros.types import Episode, Floats, Track
+
+EARLY_SHOT_NS = 10**9
+"""A shot stamped longer than this before the start of its recording belongs to an earlier episode [ns]."""
+
+
+@dataclass(frozen=True)
+class TopicSummary:
+    """One topic of a bag."""
+
+    name: str
+    type: str
+    messages: int
+    known: bool
+    """Whether its messages can be read: tracks, the shot, the episode's header and notes. Others are left alone."""
+
+
+@dataclass(frozen=True)
+class BagContent:
+    """An episode and what else its bag holds."""
+
+    episode: Episode
+    topics: tuple[TopicSummary, ...]
+    """All topics, by name."""
+
+
+def list_topics(path: str | Path) -> tuple[TopicSummary, ...]:
+    """All topics of a bag, by name. Raises BagError."""
+    counts: dict[RawTopic, int] = {}
+    for item in scan(Path(path)):
+        _count(counts, item)
+    return _summaries(counts)
+
+
+def find_bags(paths: Iterable[str | Path]) -> tuple[Path, ...]:
+    """The bags that paths name: bags as they are; a folder of bags stands for all in it (not deeper). Each bag once.
+
+    Raises BagError for a path that is neither, and where there is no bag at all.
+    """
+    found: dict[Path, Path] = {}
+    for path in map(Path, paths):
+        for bag in [path] if is_bag(path) or not path.is_dir() else sorted(filter(is_bag, path.iterdir())):
+            found.setdefault(bag.resolve(), bag)
+    if not found:
+        raise BagError("no episodes: expected at least one bag, found none")
+    return tuple(found.values())
+
+
+def read_episodes(
+    paths: Iterable[str | Path], sources: Sequence[Source], cell: str = "", cell_hash: str = ""
+) -> tuple[Episode, ...]:
+    """Read bags (or folders of bags) given in any order; sorted by name, then start. Raises BagError."""
+    episodes = [read_episode(path, sources, cell, cell_hash) for path in find_bags(paths)]
+    return tuple(sorted(episodes, key=lambda episode: (episode.name, episode.start_ns, episode.source)))
+
+
+def read_episode(path: str | Path, sources: Sequence[Source], cell: str = "", cell_hash: str = "") -> Episode:
+    """Read one bag. Shorthand for `read_bag(...).episode`."""
+    return read_bag(path, sources, cell, cell_hash).episode
+
+
+def read_bag(path: str | Path, sources: Sequence[Source], cell: str = "", cell_hash: str = "") -> BagContent:
+    """Read one bag.
+
+    Args:
+        path: A bag's folder or file.
+        sources: Where the tracks come from, one each; each must have messages.
+        cell, cell_hash: What the bag must have been recorded in; empty: anything. A bag that does not say (a foreign
+            one) passes and gets the name `cell` and an empty hash.
+
+    Raises:
+        BagError: The bag is missing, empty, truncated, foreign, of another cell, without a wanted topic, with more than
+            one shot, with poses that are not finite, or with stamps out of order.
+    """
+    path = Path(path)
+    content = _Content({source: [] for source in sources})
+    for item in scan(path):
+        _count(content.counts, item)
+        if isinstance(item, RawMessage):
+            try:
+                content.take(item)
+            except BagError as error:
+                raise BagError(f"{path}: {error}") from error
+    try:
+        return BagContent(_episode(path, content, cell, cell_hash), _summaries(content.counts))
+    except BagError as error:
+        raise BagError(f"{path}: {error}") from error
+
+
+class _Content:
+    """What one pass over a bag collects."""
+
+    def __init__(self, tracks: dict[Source, list[Row]]) -> None:
+        self.tracks = tracks
+        self.counts: dict[RawTopic, int] = {}
+        self.headers: list[EpisodeHeader] = []
+        self.shots: list[tuple[str, Shot]] = []
+        self.notes = Notes()
+        self._by_topic: dict[str, list[Source]] = {}
+        for source in tracks:
+            self._by_topic.setdefault(source.topic, []).append(source)
+
+    def take(self, message: RawMessage) -> None:
+        topic = message.topic
+        if topic.ros1:
+            pass  # our own messages are ROS 2 ones
+        elif topic.type == EPISODE_TYPE:
+            self.headers.append(header(decode(message)))
+        elif topic.type == SHOT_TYPE:
+            self.shots.append((topic.name, shot(decode(message))))
+        elif (topic.name, topic.type) == (NOTES_TOPIC, STRING_TYPE):
+            self.notes = notes(decode(message))
+        for source in self._by_topic.get(topic.name, ()):
+            if topic.type not in KNOWN_TYPES:
+                raise BagError(f"{topic.name} is a {topic.type}; expected one of {', '.join(sorted(KNOWN_TYPES))}")
+            self.tracks[source] += rows(decode(message), topic.type, source)
+
+
+def _episode(path: Path, content: _Content, cell: str, cell_hash: str) -> Episode:
+    head = content.headers[0] if content.headers else EpisodeHeader("finished", path.stem)
+    if cell and head.cell and head.cell != cell:
+        raise BagError(f"recorded in another cell: expected '{cell}', found '{head.cell}'")
+    if cell_hash and head.cell_hash and head.cell_hash != cell_hash:
+        raise BagError(f"recorded in another '{cell}': expected configuration {cell_hash}, found {head.cell_hash}")
+    tracks = tuple(_track(source, found, content) for source, found in content.tracks.items())
+    fired = _fired(content.shots, head)
+    first_ns = min((int(track.stamp_ns[0]) for track in tracks), default=0)
+    return Episode(
+        name=head.episode or path.stem,
+        cell=head.cell or cell,
+        cell_hash=head.cell_hash,
+        action=fired.action if fired else {},
+        start_ns=fired.stamp_ns if fired else head.start_ns or first_ns,
+        tracks=tracks,
+        initial_state=content.notes.initial_state,
+        source=str(path),
+    )
+
+
+def _fired(shots: Sequence[tuple[str, Shot]], head: EpisodeHeader) -> Shot | None:
+    """The one shot of an episode: a robot's own message before the operator's (SHOT_TOPIC), no earlier episode's."""
+    own = [found for topic, found in shots if topic != SHOT_TOPIC] or [found for _, found in shots]
+    recent = [found for found in own if found.stamp_ns >= head.start_ns - EARLY_SHOT_NS] or own
+    stamps = sorted({found.stamp_ns for found in recent})
+    if len(stamps) > 1:
+        seconds = ", ".join(f"{stamp * 1e-9:.3f}" for stamp in stamps[:4])
+        raise BagError(f"expected one shot an episode, found {len(stamps)} (at {seconds} s)")
+    return recent[0] if recent else None
+
+
+def _track(source: Source, found: Sequence[Row], content: _Content) -> Track:
+    if not found:
+        raise BagError(_no_messages(source, content.counts))
+    once = [row for index, row in enumerate(found) if index == 0 or row != found[index - 1]]
+    stamps = np.array([row.stamp_ns for row in once], np.int64)
+    values = np.array([row.value for row in once], float)
+    backwards = np.flatnonzero(np.diff(stamps) <= 0)
+    if backwards.size:
+        index = int(backwards[0]) + 1
+        step = int(stamps[index] - stamps[index - 1])
+        how = f"{-step} ns before the one before it" if step else "as is the one before it"
+        where = f"message {index + 1} of {source.object} is stamped {stamps[index]} ns, {how}"
+        raise BagError(f"{source.topic}: stamps out of order: {where}")
+    std = _std(once, source, content.notes)
+    return Track(source.object, source.quantity, stamps, _finite(values, source, "pose"), std)
+
+
+def _std(found: Sequence[Row], source: Source, said: Notes) -> Floats | None:
+    stated = [row.std for row in found if row.std is not None]
+    if len(stated) < len(found):
+        noted = said.std.get(source.object)
+        if noted is None:
+            return None
+        stated = list(noted) if len(noted) == len(found) else [noted[0]] * len(found)
+    return _finite(np.array(stated), source, "standard deviation")
+
+
+def _finite(values: Floats, source: Source, what: str) -> Floats:
+    bad = np.flatnonzero(~np.isfinite(values).reshape(len(values), -1).all(axis=1))
+    if bad.size:
+        raise BagError(
+            f"{source.topic}: {what} of {source.object} is not finite in message {bad[0] + 1} "
+            f"({bad.size} of {len(values)} messages): {values[bad[0]]}"
+        )
+    return values
+
+
+def _no_messages(source: Source, counts: Mapping[RawTopic, int]) -> str:
+    names = sorted({topic.name for topic in counts})
+    if source.topic in names:
+        what = f" of '{source.entry or source.object}'" if source.entry or source.quantity == "joint" else ""
+        return f"no messages{what} on {source.topic} ({source.object} was never seen)"
+    known = f"it has {', '.join(names[:12])}{', ...' * (len(names) > 12)}" if names else "it has no topics"
+    return f"no topic {source.topic} for {source.object}; {known}{nearest(source.topic, names)}"
+
+
+def _count(counts: dict[RawTopic, int], item: RawTopic | RawMessage) -> None:
+    if isinstance(item, RawMessage):
+        counts[item.topic] += 1
+    else:
+        counts.setdefault(item, 0)
+
+
+def _summaries(counts: Mapping[RawTopic, int]) -> tuple[TopicSummary, ...]:
+    known = KNOWN_TYPES | {EPISODE_TYPE, SHOT_TYPE}
+    return tuple(
+        TopicSummary(topic.name, topic.type, count, topic.type in known or topic.name == NOTES_TOPIC)
+        for topic, count in sorted(counts.items(), key=lambda item: (item[0].name, item[0].type))
+    )
