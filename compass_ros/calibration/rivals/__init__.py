@@ -1,0 +1,1 @@
+"""What others would use on the same `Problem`, each with its published settings."""
