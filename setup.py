@@ -30,9 +30,9 @@ def native() -> list[Extension]:
 
 
 def shared(folder: str) -> list[tuple[str, list[str]]]:
-    """The files of a top folder, for share/compass_ros, in the same tree."""
+    """The files of a top folder, for share/compass_ros, in the same tree. The cells are in the package already."""
     files = sorted(path.relative_to(ROOT) for path in (ROOT / folder).rglob("*") if path.is_file())
-    files = [path for path in files if "__pycache__" not in path.parts]
+    files = [path for path in files if not {"__pycache__", "cells"} & set(path.parts)]
     return [(f"share/{NAME}/{path.parent}", [str(path)]) for path in files]
 
 
@@ -43,8 +43,13 @@ setup(
     license="Apache-2.0",
     license_files=["LICENSE"],
     python_requires=">=3.10",
-    packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed", "**/*.json", "**/*.html", "**/*.css", "**/*.js", "**/*.yaml", "**/*.c"]},
+    # The cells travel inside the package, where the core finds them without ROS.
+    packages=[*find_packages(include=[NAME, f"{NAME}.*"]), f"{NAME}.config.cells"],
+    package_dir={f"{NAME}.config.cells": "config/cells"},
+    package_data={
+        NAME: ["py.typed", "**/*.json", "**/*.j2", "**/*.css", "**/*.js", "**/*.c"],
+        f"{NAME}.config.cells": ["*.yaml", "*.xml"],
+    },
     ext_modules=native(),
     cmdclass={"build_ext": PlainLibrary},
     data_files=[
