@@ -42,7 +42,7 @@ class FiducialConfig:
     """Centre of each marker of `ids` in the frame `table` [m]."""
     y_m: tuple[float, ...] = (0.31, 0.31, -0.31, -0.31)
     min_markers: int = Field(3, ge=2, le=50, description="markers that must be seen to place the table")
-    max_residual_px: float = Field(1.0, gt=0, le=20, description="largest rms reprojection error of their corners [px]")
+    max_residual_px: float = Field(0.6, gt=0, le=20, description="largest rms reprojection error of their corners [px]")
 
 
 def _air_hockey() -> dict[str, ObjectConfig]:

@@ -21,7 +21,7 @@ from compass_ros.types import Floats
 _AVERAGED = 40
 """Images over which a corner is averaged."""
 _MOVED_PX = 1.5
-"""A marker that jumps by more has been moved, or the camera has."""
+"""Markers that jump by more: the camera has moved."""
 
 
 @dataclass(frozen=True)
@@ -88,17 +88,27 @@ def recheck(
     high = np.ceil(known.max(axis=0) + margin).astype(int)
     crop = np.ascontiguousarray(gray[low[1] : high[1], low[0] : high[0]])
     seen = detect_markers(crop, config).get(number)
-    return fix if seen is None else _merge(fix, {number: seen + low}, camera, config)
+    if seen is None:
+        return fix
+    seen = seen + low
+    return update_fix(fix, gray, camera, config) if _jumped(seen, known) else _merge(fix, {number: seen}, camera, config)
+
+
+def _jumped(seen: Floats, known: Floats) -> bool:
+    return bool(np.abs(seen - known).max() > _MOVED_PX)
 
 
 def _merge(fix: TableFix, seen: Mapping[int, Floats], camera: CameraModel, config: FiducialConfig) -> TableFix:
     corners = dict(fix.corners)
+    jumped = [number for number, pixel in seen.items() if number in corners and _jumped(pixel, corners[number].pixel)]
+    if fix.view is not None and len(jumped) >= config.min_markers:
+        # the camera has moved: every corner remembered from before is worth nothing
+        return _merge(TableFix(), seen, camera, config)
     for number, pixel in seen.items():
+        if number in jumped and fix.view is not None:
+            continue  # one marker alone: half hidden, found in the wrong place
         known = corners.get(number)
-        if known is None or np.abs(pixel - known.pixel).max() > _MOVED_PX:
-            if known is not None and fix.view is not None:
-                # the camera has moved: every corner remembered from before is worth nothing
-                return _merge(TableFix(), seen, camera, config)
+        if known is None or number in jumped:
             corners[number] = Corners(pixel, 1)
             continue
         images = min(known.images + 1, _AVERAGED)
@@ -110,12 +120,17 @@ def _merge(fix: TableFix, seen: Mapping[int, Floats], camera: CameraModel, confi
         )
         return TableFix(corners, None, float("nan"), problem)
     view, residual = _solve(corners, camera, config, fix.view)
+    # a corner that something hides in part is found in the wrong place
+    while residual > config.max_residual_px and len(corners) > config.min_markers:
+        rest = [{n: c for n, c in corners.items() if n != left_out} for left_out in corners]
+        fits = [(_solve(some, camera, config, None), some) for some in rest]
+        (view, residual), corners = min(fits, key=lambda fit: fit[0][1])
     if residual > config.max_residual_px:
         problem = (
             f"fiducials do not lie where configured: reprojection error {residual:.2f} px, "
             f"expected at most {config.max_residual_px} px"
         )
-        return TableFix(corners, None, residual, problem)
+        return TableFix({}, None, residual, problem)
     return TableFix(corners, view, residual, "")
 
 

@@ -27,12 +27,10 @@ _RADII = 48
 """Radii around a disc."""
 _REACH = np.linspace(0.62, 1.38, 33)
 """Where each radius is sampled, in units of the disc's radius."""
-_INNER = _REACH < 0.80
-_OUTER = _REACH > 1.18
+_INNER = (_REACH > 0.68) & (_REACH < 0.87)
+_OUTER = (_REACH > 1.12) & (_REACH<1.26)
 _LEAST_CONTRAST = 25.0
 """Grey levels between an object's colour and its surroundings, shading apart, under which no step is looked for."""
-_SHADE = 0.6
-"""Largest logarithm of a ratio of brightness that is put down to a shadow."""
 _OFFSET_STD_M = 0.0003
 """Prior of the common radial offset."""
 _STEP_NOISE_M = 0.00025
@@ -102,7 +100,7 @@ def _steps(
     contrast /= np.maximum(strength, 1.0)[..., None]
     mine = np.stack([_has_colour(inside[i], look) & ~_has_colour(outside[i], look) for i, look in enumerate(looks)])
     usable = mine & (strength > _LEAST_CONTRAST)
-    level = _level(colour, inside, outside, unit, contrast, usable)
+    level = _level(colour, inside, outside, unit, contrast)
     below = (level[:, :, 1:] < 0.5) & (level[:, :, :-1] >= 0.5)
     first = below.argmax(axis=2)
     high = np.take_along_axis(level, first[..., None], axis=2)[..., 0]
@@ -114,24 +112,16 @@ def _steps(
 
 
 def _level(
-    colour: _Colours, inside: _Colours, outside: _Colours, unit: _Colours, contrast: _Colours, usable: Bools
+    colour: _Colours, inside: _Colours, outside: _Colours, unit: _Colours, contrast: _Colours
 ) -> _Colours:
     """(S, M, N) share of each sample that the object covers: 1 inside, 0 outside, whatever shadow lies across.
 
     A sample is light * (a * object + (1 - a) * surroundings). The ratio of its components along `contrast` and along
-    `unit` (the colour of the surroundings, at right angles to it) is free of the light and gives a, once the ratio of
-    the object's to the surroundings' brightness in the same light is known: the median over the radii.
+    `unit` (the colour of the surroundings, at right angles to it) is free of the light and gives a.
     """
     bright = np.maximum((inside * unit).sum(axis=-1), 1.0)
-    relative = np.maximum((outside * unit).sum(axis=-1), 1.0) / bright
+    relative = (np.maximum((outside * unit).sum(axis=-1), 1.0) / bright)[..., None]
     vivid = (inside * contrast).sum(axis=-1) / bright
-    ordered = np.sort(np.where(usable, relative, np.float32(np.inf)), axis=1)
-    middle = np.maximum(usable.sum(axis=1) - 1, 0) // 2
-    usual = np.take_along_axis(ordered, middle[:, None], axis=1)
-    usual = np.where(np.isfinite(usual), usual, np.float32(1))
-    # surroundings of another brightness (a dark obstacle) speak for themselves
-    near = np.abs(np.log(relative / usual)) < _SHADE
-    relative = np.where(near, usual, relative)[..., None]
     ratio = np.einsum("smnc,smc->smn", colour, contrast) / np.maximum(np.einsum("smnc,smc->smn", colour, unit), 1.0)
     return np.asarray(ratio * relative / np.maximum(vivid[..., None] + ratio * (relative - 1), 1e-3))
 
