@@ -15,6 +15,7 @@ from compass_ros.episodes.reader import (
 )
 from compass_ros.episodes.recovery import Recovery, recover, unfinished
 from compass_ros.episodes.sources import Source, default_sources
+from compass_ros.episodes.tables import import_tables
 
 __all__ = [
     "BagContent",
@@ -23,6 +24,7 @@ __all__ = [
     "TopicSummary",
     "default_sources",
     "find_bags",
+    "import_tables",
     "list_topics",
     "read_bag",
     "read_episode",

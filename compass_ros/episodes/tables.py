@@ -1,0 +1,202 @@
+"""Tables of measurements become bags, as a YAML describes them (docs/foreign-bags.md lists its fields)."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import field
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
+
+from compass_ros.config import read_yaml
+from compass_ros.episodes.episode_writer import write_episode
+from compass_ros.episodes.names import episode_name
+from compass_ros.episodes.table_files import FORMATS, Table
+from compass_ros.errors import BagError, ConfigError, DataError, nearest
+from compass_ros.types import QUANTITY_SIZE, Episode, Floats, Ints, Quantity, Track
+
+DATA_VARIABLE = "COMPASS_REAL_DATA"
+_PROJECT = Path(__file__).parents[2]
+_FIRST_STAMP_NS = 10**9
+"""Stamp of time 0 of a table: one second, because a stamp of 0 means `not set` in ROS."""
+
+_strict = ConfigDict(extra="forbid")
+
+
+@dataclass(frozen=True, config=_strict)
+class TimeColumn:
+    """Where the time of a row comes from: a column, or a rate."""
+
+    column: str = ""
+    unit_s: Annotated[float, Field(gt=0)] = 1.0
+    """Seconds in one unit of the column."""
+    rate_hz: Annotated[float, Field(ge=0)] = 0.0
+    """Rows a second, where there is no column."""
+
+
+@dataclass(frozen=True, config=_strict)
+class Numbers:
+    """Columns of a table as SI numbers: (column - minus) * scale + offset."""
+
+    columns: tuple[str | int | None, ...]
+    """null: zero in every row."""
+    minus: tuple[str | int | None, ...] = ()
+    """Columns to subtract, e.g. for the angle of one link relative to another."""
+    scale: tuple[float, ...] = ()
+    """SI units in one unit of the column; empty: 1."""
+    offset: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, config=_strict)
+class TrackColumns(Numbers):
+    quantity: Quantity = "xyz"
+    std: Annotated[float, Field(ge=0)] = 0.0
+    """Standard deviation of one measurement [m or rad]; 0: not stated."""
+
+
+@dataclass(frozen=True, config=_strict)
+class Recordings:
+    """Some tables of one file; each becomes a bag."""
+
+    file: str
+    format: Literal["csv", "xlsx", "npz", "mat"]
+    name: str
+    """Name of the episode, with {key}, {group}, {index}; other signs than letters, digits, `_`, `-`, `.` become `_`."""
+    tables: str = "*"
+    """npz: pattern of the arrays' names; xlsx: of the sheets' names; mat: variables side by side, `time=T state=Y`."""
+    group_by: str = ""
+    """csv, xlsx: a column whose values part the rows into recordings."""
+
+
+@dataclass(frozen=True, config=_strict)
+class ImportConfig:
+    """The YAML of an import."""
+
+    cell: str
+    recordings: tuple[Recordings, ...]
+    time: TimeColumn
+    tracks: dict[str, TrackColumns]
+    initial_state: dict[str, Numbers] = field(default_factory=dict)
+    """By object: from the first row."""
+    action: dict[str, Numbers] = field(default_factory=dict)
+    """By name of the action's field: one column, from the first row."""
+
+
+def import_tables(yaml_path: str | Path, out: str | Path, data: str | Path | None = None) -> list[Path]:
+    """Write one bag into the folder `out` for every recording that a YAML describes; returns their paths.
+
+    The files are looked for in `data`; without it in the folder named by COMPASS_REAL_DATA, beside the YAML, and in
+    `../shared/data` from the project's root.
+
+    Raises:
+        ConfigError: The YAML is wrong. DataError: a file is missing or does not hold what the YAML says.
+        BagError: A bag exists already or cannot be written.
+    """
+    path = Path(yaml_path)
+    config = _config(path)
+    roots = [Path(data)] if data is not None else _roots(path)
+    return [
+        write_episode(episode, out)
+        for recordings in config.recordings
+        for episode in _episodes(config, recordings, _find(recordings.file, roots, path))
+    ]
+
+
+def _config(path: Path) -> ImportConfig:
+    try:
+        return TypeAdapter(ImportConfig).validate_python(dict(read_yaml(path)))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        hint = nearest(str(first["loc"][-1]), ImportConfig.__dataclass_fields__)
+        hint = hint if first["type"] == "unexpected_keyword_argument" else ""
+        raise ConfigError(f"{path}: {where}: {first['msg']}, found {first['input']!r}{hint}") from error
+
+
+def _roots(path: Path) -> list[Path]:
+    named = os.environ.get(DATA_VARIABLE)
+    return [Path(named)] if named else [path.parent, _PROJECT.parent / "shared" / "data"]
+
+
+def _find(name: str, roots: Sequence[Path], path: Path) -> Path:
+    pure = PurePosixPath(name)
+    if pure.is_absolute() or ".." in pure.parts:
+        raise ConfigError(f"{path}: file '{name}': expected a path inside the data folder")
+    for root in roots:
+        if (root / pure).is_file():
+            return root / pure
+    raise DataError(f"{path}: no file {name} in {' or '.join(str(root) for root in roots)}; set {DATA_VARIABLE}")
+
+
+def _episodes(config: ImportConfig, recordings: Recordings, file: Path) -> list[Episode]:
+    found = [_episode(config, recordings, file, table) for table in _tables(recordings, file)]
+    names = [episode.name for episode in found]
+    if not found:
+        raise DataError(f"{file}: no table matches '{recordings.tables}'")
+    if len(set(names)) < len(names):
+        raise ConfigError(f"{file}: '{recordings.name}' gives the same name to several recordings, e.g. {names[0]}")
+    return found
+
+
+def _tables(recordings: Recordings, file: Path) -> list[Table]:
+    return list(FORMATS[recordings.format](file, recordings.tables, recordings.group_by))
+
+
+def _episode(config: ImportConfig, recordings: Recordings, file: Path, table: Table) -> Episode:
+    try:
+        name = re.sub(r"[^A-Za-z0-9_.-]+", "_", recordings.name.format(**table.labels))
+    except (KeyError, IndexError, ValueError, AttributeError) as error:
+        raise ConfigError(f"name '{recordings.name}': expected only {{{'}, {'.join(table.labels)}}}") from error
+    try:
+        stamps = _stamps(config.time, table)
+        tracks = tuple(_track(target, columns, stamps, table) for target, columns in config.tracks.items())
+        initial = {target: tuple(_rows(columns, table)[0].tolist()) for target, columns in config.initial_state.items()}
+        action = {target: float(_rows(columns, table)[0, 0]) for target, columns in config.action.items()}
+        return Episode(episode_name(name), config.cell, "", action, int(stamps[0]), tracks, initial)
+    except (DataError, BagError) as error:
+        raise DataError(f"{file}: {name}: {error}") from error
+
+
+def _stamps(time: TimeColumn, table: Table) -> Ints:
+    rows = len(next(iter(table.columns.values())))
+    if time.column:
+        since = (table.column(time.column) - table.column(time.column)[0]) * time.unit_s
+    elif time.rate_hz > 0:
+        since = np.arange(rows) / time.rate_hz
+    else:
+        raise DataError("time: expected a column or a rate_hz")
+    if not np.isfinite(since).all() or (np.diff(since) <= 0).any():
+        bad = int(np.flatnonzero(~(np.diff(since) > 0))[0]) + 1
+        raise DataError(f"time does not increase in row {bad + 1}: {since[bad - 1]:g} s, then {since[bad]:g} s")
+    return np.asarray(_FIRST_STAMP_NS + np.round(since * 1e9), np.int64)
+
+
+def _track(target: str, columns: TrackColumns, stamps: Ints, table: Table) -> Track:
+    size = QUANTITY_SIZE[columns.quantity]
+    if len(columns.columns) != size:
+        raise DataError(f"{target}: expected {size} columns for '{columns.quantity}', found {len(columns.columns)}")
+    values = _rows(columns, table)
+    if not np.isfinite(values).all():
+        raise DataError(f"{target}: not finite in row {int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0]) + 1}")
+    std = np.full(len(stamps), columns.std) if columns.std else None
+    return Track(target, columns.quantity, stamps, values, std)
+
+
+def _rows(numbers: Numbers, table: Table) -> Floats:
+    """(F, columns) SI numbers."""
+    scale = np.array(numbers.scale or (1.0,))
+    offset = np.array(numbers.offset or (0.0,))
+    for name, given in (("scale", scale), ("offset", offset), ("minus", np.array(numbers.minus or (None,)))):
+        if len(given) not in (1, len(numbers.columns)):
+            raise DataError(f"{name}: expected 1 or {len(numbers.columns)} entries, found {len(given)}")
+    return np.asarray((_stack(numbers.columns, table) - _stack(numbers.minus or (None,), table)) * scale + offset)
+
+
+def _stack(names: Sequence[str | int | None], table: Table) -> Floats:
+    zeros = np.zeros(len(next(iter(table.columns.values()))))
+    return np.stack([zeros if name is None else table.column(str(name)) for name in names], axis=1)
