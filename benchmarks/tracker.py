@@ -2,7 +2,7 @@
 
     python benchmarks/tracker.py --shots 200 [--simulator]
 
-Random planar shots with bounces, collisions and an arm that hides pucks; with --simulator, shots of the air-hockey cell.
+Random planar shots with bounces, collisions and an arm that hides pucks; with --simulator, shots of the cell.
 """
 
 from __future__ import annotations
@@ -62,13 +62,13 @@ def main() -> None:
         state = TrackerState()
         filmed = film(camera, shot, _DURATION_S, number * 1000)
         while True:
-            started = time.perf_counter()
+            started = time.process_time()
             image = next(filmed, None)
-            drawn = time.perf_counter()
+            drawn = time.process_time()
             if image is None:
                 break
             state, frame = step(state, image.bgr, image.stamp_ns, camera.scene.view.camera, config)
-            tracking.append(time.perf_counter() - drawn)
+            tracking.append(time.process_time() - drawn)
             drawing.append(drawn - started)
             images += len(names)
             swaps += _swapped(frame, image.truth)
@@ -79,22 +79,30 @@ def main() -> None:
                     errors[sighting.object].append(distance)
                     normalised.append(distance / sighting.std)
                     if distance > 0.003:
-                        print(f"  shot {number} {image.stamp_ns * 1e-9:.3f} s {sighting.object}: {distance * 1e3:.2f} mm,"
-                              f" std {sighting.std * 1e3:.2f} mm, arc {sighting.arc:.2f}")
+                        print(
+                            f"  shot {number} {image.stamp_ns * 1e-9:.3f} s {sighting.object}: {distance * 1e3:.2f} mm,"
+                            f" std {sighting.std * 1e3:.2f} mm, arc {sighting.arc:.2f}"
+                        )
                 else:
                     bridged.append(distance)
     for name in names:
         e = np.array(errors[name]) * 1e3
         print(f"{name:8s} rms {np.sqrt((e**2).mean()):.3f} mm, p99 {np.quantile(e, 0.99):.3f} mm, max {e.max():.3f} mm")
     everything = np.concatenate([np.array(e) for e in errors.values()]) * 1e3
-    print(f"all      rms {np.sqrt((everything**2).mean()):.3f} mm, p99 {np.quantile(everything, 0.99):.3f} mm "
-          f"(targets 1 and 3), error / stated std: rms {np.sqrt(np.mean(np.square(normalised)) / 2):.2f} a coordinate")
-    print(f"seen in {seen / images:.1%} of {images} object images, bridged {len(bridged)}"
-          + (f" with rms {np.sqrt(np.mean(np.square(bridged))) * 1e3:.1f} mm" if bridged else ""))
+    print(
+        f"all      rms {np.sqrt((everything**2).mean()):.3f} mm, p99 {np.quantile(everything, 0.99):.3f} mm "
+        f"(targets 1 and 3), error / stated std: rms {np.sqrt(np.mean(np.square(normalised)) / 2):.2f} a coordinate"
+    )
+    print(
+        f"seen in {seen / images:.1%} of {images} object images, bridged {len(bridged)}"
+        + (f" with rms {np.sqrt(np.mean(np.square(bridged))) * 1e3:.1f} mm" if bridged else "")
+    )
     print(f"identity swaps {swaps} in {arguments.shots} shots (target 0)")
     ms = np.array(tracking) * 1e3
-    print(f"track {np.median(ms):.2f} ms median, {ms.mean():.2f} mean, {np.quantile(ms, 0.99):.2f} p99 an image on one "
-          f"core (target 6); draw {np.median(drawing) * 1e3:.2f} ms (target 8)")
+    print(
+        f"track {np.median(ms):.2f} ms median, {ms.mean():.2f} mean, {np.quantile(ms, 0.99):.2f} p99 an image on one "
+        f"core (target 6); draw {np.median(drawing) * 1e3:.2f} ms (target 8)"
+    )
 
 
 def _swapped(frame: Frame, truth: dict[str, np.ndarray]) -> int:

@@ -75,9 +75,7 @@ def _project(view: TableView, outline: Floats, height: float) -> Floats:
     return view.pixel_from_table(points)
 
 
-def _fill(
-    image: NDArray[np.uint8], view: TableView, outline: Floats, height: float, colour: tuple[float, ...]
-) -> None:
+def _fill(image: NDArray[np.uint8], view: TableView, outline: Floats, height: float, colour: tuple[float, ...]) -> None:
     pixel = np.rint(_project(view, outline, height) * (1 << _SHIFT)).astype(np.int32)
     cv2.fillPoly(image, [pixel], colour, cv2.LINE_AA, _SHIFT)
 
@@ -91,7 +89,7 @@ def _draw_shadow(image: NDArray[np.uint8], view: TableView, arm: ArmConfig, pose
     for a, b, radius in ((base, elbow, 0.030), (elbow, hand, 0.024)):
         pixel = (_project(view, _capsule(a, b, radius), 0.0) + 0.5) / _SHADOW_SHRINK - 0.5
         points = np.rint(pixel * (1 << _SHIFT)).astype(np.int32)
-        cv2.fillPoly(small, [points], round(255 * _SHADOW), cv2.LINE_AA, _SHIFT)
+        cv2.fillPoly(small, [points], (255 * _SHADOW,), cv2.LINE_AA, _SHIFT)
     soft = cv2.blur(small, (3, 3))
     rows, columns = (np.flatnonzero((soft < 255).any(axis=axis)) for axis in (1, 0))
     if rows.size == 0:

@@ -45,7 +45,7 @@ def colour_mask(hsv: NDArray[np.uint8], look: ObjectConfig) -> NDArray[np.uint8]
     # the circle of hues is cut at red; an interval across the cut is two
     spans = [(max(low, 0), min(high, 360)), *([(low + 360, 360.0)] if low < 0 else [])]
     spans += [(0.0, high - 360)] if high > 360 else []
-    masks = [cv2.inRange(hsv, (a / 2, *least), (b / 2, 255, 255)) for a, b in spans]
+    masks = [cv2.inRange(hsv, np.array([a / 2, *least]), np.array([b / 2, 255, 255])) for a, b in spans]
     return np.asarray(masks[0] if len(masks) == 1 else cv2.bitwise_or(*masks), dtype=np.uint8)
 
 

@@ -92,9 +92,12 @@ class TableView:
 
 
 def camera_model(
-    width: int, height: int, matrix: Sequence[float], distortion_model: str, distortion: Sequence[float], where: str
+    size: tuple[int, int], matrix: Sequence[float], distortion_model: str, distortion: Sequence[float], where: str
 ) -> CameraModel:
-    """Check the fields of a camera_info (`matrix`: 9 numbers row by row). Raises TrackingError naming `where`."""
+    """Check the fields of a camera_info: `size` is width and height, `matrix` 9 numbers row by row.
+
+    Raises TrackingError naming `where`.
+    """
     k = np.asarray(matrix, dtype=np.float64).reshape(-1)
     if k.size != 9 or not np.all(np.isfinite(k)) or k[0] <= 0 or k[4] <= 0:
         raise TrackingError(f"{where}: not calibrated: expected the 9 numbers of K with fx, fy > 0, found {k.tolist()}")
@@ -107,6 +110,7 @@ def camera_model(
         raise TrackingError(
             f"{where}: distortion model '{distortion_model}' expects {expected} coefficients, found {d.size}"
         )
+    width, height = size
     if width <= 0 or height <= 0:
         raise TrackingError(f"{where}: image size must be positive, found {width}x{height}")
     return CameraModel(width, height, k.reshape(3, 3), d)
@@ -126,4 +130,4 @@ def read_camera(path: Path) -> CameraModel:
         raise TrackingError(f"{path}: expected integers image_width and image_height, found {size}")
     model = str(content.get("distortion_model", "plumb_bob"))
     width, height = (int(str(number)) for number in size)
-    return camera_model(width, height, data["camera_matrix"], model, data["distortion_coefficients"], str(path))
+    return camera_model((width, height), data["camera_matrix"], model, data["distortion_coefficients"], str(path))

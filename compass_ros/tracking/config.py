@@ -24,11 +24,11 @@ class ObjectConfig:
     """How one round object looks from above."""
 
     hue_deg: float = Field(ge=0, le=360, description="hue of its colour [degrees]")
-    radius_m: float = Field(0.0255, ge=0.005, le=0.2, description="radius of its rim [m]")
-    height_m: float = Field(0.006, ge=0, le=0.1, description="height of its top face over the table [m]")
-    hue_tolerance_deg: float = Field(18.0, ge=2, le=90, description="half-width of the accepted hues [degrees]")
-    min_saturation: float = Field(0.35, ge=0.05, le=1, description="least saturation of its colour, 0 to 1")
-    min_value: float = Field(0.12, ge=0.02, le=1, description="least brightness of its colour, 0 to 1")
+    radius_m: float = Field(default=0.0255, ge=0.005, le=0.2, description="radius of its rim [m]")
+    height_m: float = Field(default=0.006, ge=0, le=0.1, description="height of its top face over the table [m]")
+    hue_tolerance_deg: float = Field(default=18.0, ge=2, le=90, description="half-width of the accepted hues [degrees]")
+    min_saturation: float = Field(default=0.35, ge=0.05, le=1, description="least saturation of its colour, 0 to 1")
+    min_value: float = Field(default=0.12, ge=0.02, le=1, description="least brightness of its colour, 0 to 1")
 
 
 @dataclass(frozen=True, config=_strict)
@@ -36,13 +36,15 @@ class FiducialConfig:
     """ArUco markers flat on the table's plane, the top of the print towards +y."""
 
     dictionary: str = "DICT_4X4_50"
-    side_m: float = Field(0.06, gt=0.005, le=0.5, description="side of the black square [m]")
+    side_m: float = Field(default=0.06, gt=0.005, le=0.5, description="side of the black square [m]")
     ids: tuple[int, ...] = (0, 1, 2, 3)
     x_m: tuple[float, ...] = (-0.44, 0.44, 0.44, -0.44)
     """Centre of each marker of `ids` in the frame `table` [m]."""
     y_m: tuple[float, ...] = (0.31, 0.31, -0.31, -0.31)
-    min_markers: int = Field(3, ge=2, le=50, description="markers that must be seen to place the table")
-    max_residual_px: float = Field(0.6, gt=0, le=20, description="largest rms reprojection error of their corners [px]")
+    min_markers: int = Field(default=3, ge=2, le=50, description="markers that must be seen to place the table")
+    max_residual_px: float = Field(
+        default=0.6, gt=0, le=20, description="largest rms reprojection error of their corners [px]"
+    )
 
 
 def _air_hockey() -> dict[str, ObjectConfig]:
@@ -59,15 +61,23 @@ class TrackerConfig:
 
     objects: Mapping[str, ObjectConfig] = Field(default_factory=_air_hockey)
     fiducials: FiducialConfig = Field(default_factory=FiducialConfig)
-    x_limit_m: float = Field(0.53, gt=0, le=5, description="objects are looked for at |x| up to this [m]")
-    y_limit_m: float = Field(0.30, gt=0, le=5, description="objects are looked for at |y| up to this [m]")
-    min_arc: float = Field(0.3, ge=0.15, le=1, description="least share of the rim that must be seen")
-    max_std_m: float = Field(0.002, gt=0, le=0.05, description="a less certain measurement counts as not seen [m]")
-    systematic_std_m: float = Field(0.0002, ge=0, le=0.01, description="error of the table's frame, added to each std [m]")
-    acceleration_std: float = Field(4.0, gt=0, le=1000, description="unmodelled acceleration between frames [m/s^2]")
-    gate_m: float = Field(0.08, gt=0, le=1, description="farthest jump from the prediction for objects alike [m]")
-    bridge_s: float = Field(0.5, ge=0, le=5, description="how long an unseen object is predicted [s]")
-    bridged_std_m: float = Field(0.01, gt=0, le=1, description="least std of a predicted, not seen position [m]")
+    x_limit_m: float = Field(default=0.53, gt=0, le=5, description="objects are looked for at |x| up to this [m]")
+    y_limit_m: float = Field(default=0.30, gt=0, le=5, description="objects are looked for at |y| up to this [m]")
+    min_arc: float = Field(default=0.3, ge=0.15, le=1, description="least share of the rim that must be seen")
+    max_std_m: float = Field(
+        default=0.002, gt=0, le=0.05, description="a less certain measurement counts as not seen [m]"
+    )
+    systematic_std_m: float = Field(default=0.0002, ge=0, le=0.01, description="error of the table's frame [m]")
+    acceleration_std: float = Field(
+        default=4.0, gt=0, le=1000, description="unmodelled acceleration between frames [m/s^2]"
+    )
+    gate_m: float = Field(
+        default=0.08, gt=0, le=1, description="farthest jump from the prediction for objects alike [m]"
+    )
+    bridge_s: float = Field(default=0.5, ge=0, le=5, description="how long an unseen object is predicted [s]")
+    bridged_std_m: float = Field(
+        default=0.01, gt=0, le=1, description="least std of a predicted, not seen position [m]"
+    )
 
 
 def tracker_config(content: Mapping[str, object], where: str = "tracker configuration") -> TrackerConfig:

@@ -49,7 +49,8 @@ class TableFix:
 def _detector(dictionary: str) -> cv2.aruco.ArucoDetector:
     names = [name for name in dir(cv2.aruco) if name.startswith("DICT_")]
     if dictionary not in names:
-        raise ConfigError(f"fiducials.dictionary: '{dictionary}' is not an ArUco dictionary{nearest(dictionary, names)}")
+        hint = nearest(dictionary, names)
+        raise ConfigError(f"fiducials.dictionary: '{dictionary}' is not an ArUco dictionary{hint}")
     parameters = cv2.aruco.DetectorParameters()
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     parameters.cornerRefinementWinSize = 4
@@ -59,9 +60,9 @@ def _detector(dictionary: str) -> cv2.aruco.ArucoDetector:
 def detect_markers(gray: NDArray[np.uint8], config: FiducialConfig) -> dict[int, Floats]:
     """Markers of the configuration in a grey image: id -> (4, 2) corners in pixels."""
     corners, ids, _ = _detector(config.dictionary).detectMarkers(gray)
-    if ids is None:
-        return {}
-    found = zip(np.asarray(ids).reshape(-1).tolist(), corners, strict=True)
+    # without a marker, ids is None
+    numbers = np.asarray(ids).reshape(-1).tolist() if len(corners) else []
+    found = zip(numbers, corners, strict=True)
     return {number: np.asarray(c, dtype=np.float64).reshape(4, 2) for number, c in found if number in config.ids}
 
 
@@ -70,7 +71,7 @@ def marker_corners(config: FiducialConfig, number: int) -> Floats:
     index = config.ids.index(number)
     half = config.side_m / 2
     centre = np.array([config.x_m[index], config.y_m[index], 0.0])
-    return centre + half * np.array([[-1, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]])
+    return np.asarray(centre + half * np.array([[-1, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]]))
 
 
 def update_fix(fix: TableFix, gray: NDArray[np.uint8], camera: CameraModel, config: FiducialConfig) -> TableFix:
@@ -91,7 +92,9 @@ def recheck(
     if seen is None:
         return fix
     seen = seen + low
-    return update_fix(fix, gray, camera, config) if _jumped(seen, known) else _merge(fix, {number: seen}, camera, config)
+    if _jumped(seen, known):
+        return update_fix(fix, gray, camera, config)
+    return _merge(fix, {number: seen}, camera, config)
 
 
 def _jumped(seen: Floats, known: Floats) -> bool:

@@ -96,7 +96,7 @@ def _apart(rng: np.random.Generator, half: Floats, radius: Floats, driven: NDArr
     least = radius[:, None] + radius[None, :] + 0.004 - 10.0 * np.eye(len(radius))
     while True:
         xy = rng.uniform(-half, half)
-        xy[driven] = [-0.2, 0.06] + rng.uniform(-0.02, 0.02, (int(driven.sum()), 2))
+        xy[driven] = np.array([-0.2, 0.06]) + rng.uniform(-0.02, 0.02, (int(driven.sum()), 2))
         if np.all(np.linalg.norm(xy[:, None] - xy[None], axis=-1) > least):
             return xy
 
@@ -108,7 +108,7 @@ def _collide(xy: Floats, velocity: Floats, radius: Floats, driven: NDArray[np.bo
         for j in range(i + 1, len(xy)):
             offset = xy[j] - xy[i]
             distance = float(np.hypot(*offset))
-            if distance >= radius[i] + radius[j] or driven[i] and driven[j]:
+            if distance >= radius[i] + radius[j] or (driven[i] and driven[j]):
                 continue
             normal = offset / distance
             closing = float((velocity[i] - velocity[j]) @ normal)

@@ -28,7 +28,7 @@ _RADII = 48
 _REACH = np.linspace(0.62, 1.38, 33)
 """Where each radius is sampled, in units of the disc's radius."""
 _INNER = (_REACH > 0.68) & (_REACH < 0.87)
-_OUTER = (_REACH > 1.12) & (_REACH<1.26)
+_OUTER = (_REACH > 1.12) & (_REACH < 1.26)
 _LEAST_CONTRAST = 25.0
 """Grey levels between an object's colour and its surroundings, shading apart, under which no step is looked for."""
 _OFFSET_STD_M = 0.0003
@@ -61,13 +61,12 @@ def fit_rims(
     A seed may be off by a third of the radius. A fit with a small `arc` or a large covariance is not to be trusted.
     """
     centre = np.asarray(seeds, dtype=np.float64)
-    radius = np.array([look.radius_m for look in looks])
-    height = np.array([look.height_m for look in looks])
+    radius, height = _sizes(looks)
     weight = np.zeros((len(centre), _RADII))
     normal = np.tile(np.eye(3), (len(centre), 1, 1))
     spread = np.full(len(centre), np.inf)
     for _ in range(rounds):
-        step, usable = _steps(image, view, centre, radius, height, looks)
+        step, usable = _steps(image, view, centre, looks)
         residual = step - _silhouette(view, centre, radius, height)
         shift, weight, normal, spread = _fit_circle(residual, usable)
         centre = centre + np.clip(shift, -0.5 * radius[:, None], 0.5 * radius[:, None])
@@ -77,15 +76,18 @@ def fit_rims(
     return RimFit(centre, covariance, (weight > 0.1).mean(axis=1))
 
 
+def _sizes(looks: Sequence[ObjectConfig]) -> tuple[Floats, Floats]:
+    return np.array([look.radius_m for look in looks]), np.array([look.height_m for look in looks])
+
+
 def _steps(
     image: NDArray[np.uint8],
     view: TableView,
     centre: Floats,
-    radius: Floats,
-    height: Floats,
     looks: Sequence[ObjectConfig],
 ) -> tuple[Floats, Bools]:
     """(S, M) distance from the centre of each radius's colour step [m], and whether it can be one."""
+    radius, height = _sizes(looks)
     reach = radius[:, None, None, None] * _REACH[:, None]
     xy = centre[:, None, None] + reach * _NORMAL[:, None]
     points = np.concatenate([xy, np.broadcast_to(height[:, None, None, None], (*xy.shape[:3], 1))], axis=-1)
@@ -111,9 +113,7 @@ def _steps(
     return step, below.any(axis=2) & usable
 
 
-def _level(
-    colour: _Colours, inside: _Colours, outside: _Colours, unit: _Colours, contrast: _Colours
-) -> _Colours:
+def _level(colour: _Colours, inside: _Colours, outside: _Colours, unit: _Colours, contrast: _Colours) -> _Colours:
     """(S, M, N) share of each sample that the object covers: 1 inside, 0 outside, whatever shadow lies across.
 
     A sample is light * (a * object + (1 - a) * surroundings). The ratio of its components along `contrast` and along

@@ -21,7 +21,8 @@ _TEXEL_M = 0.0005
 _EXTENT_M = (1.5, 1.2)
 _SHIFT = 4
 """Fractional bits of OpenCV's drawing coordinates."""
-_FLOOR, _SHEET, _LINE, _GOAL_LINE, _RAIL = (96, 86, 76), (226, 230, 231), (150, 176, 205), (226, 168, 160), (150, 112, 78)
+_FLOOR, _SHEET, _RAIL = (96, 86, 76), (226, 230, 231), (150, 112, 78)
+_LINE, _GOAL_LINE = (150, 176, 205), (226, 168, 160)
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,8 @@ def build_scene(config: SceneConfig, table_shift_m: tuple[float, float] = (0.0, 
     texture = _texture(config, np.asarray(table_shift_m))
     column = (fine_ground[..., 0] + _EXTENT_M[0] / 2) / _TEXEL_M - 0.5
     row = (_EXTENT_M[1] / 2 - fine_ground[..., 1]) / _TEXEL_M - 0.5
-    fine = cv2.remap(texture, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    drawn = cv2.remap(texture, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    fine = np.asarray(drawn, dtype=np.uint8)
     for box in (*_rails(config), *config.boxes):
         _draw_box(fine, view, box, np.asarray(table_shift_m))
     seen = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA).astype(np.float32) * light
@@ -83,7 +85,7 @@ def _light(config: SceneConfig, ground: Floats) -> Floats:
 def _texel(xy: Floats) -> NDArray[np.int32]:
     """Points (N, 2) on the plane -> drawing coordinates in the texture with `_SHIFT` fractional bits."""
     texel = np.column_stack([xy[:, 0] + _EXTENT_M[0] / 2, _EXTENT_M[1] / 2 - xy[:, 1]]) / _TEXEL_M - 0.5
-    return np.rint(texel * (1 << _SHIFT)).astype(np.int32)
+    return np.asarray(np.rint(texel * (1 << _SHIFT)), dtype=np.int32)
 
 
 def _bgr(colour: Colour, factor: float = 1.0) -> tuple[float, float, float]:
@@ -99,8 +101,8 @@ def _texture(config: SceneConfig, shift: Floats) -> NDArray[np.uint8]:
     texture = np.empty((rows, columns, 3), np.uint8)
     texture[:] = _bgr(_FLOOR)
     # the floor's grain, stretched along x like planks
-    grain = np.random.default_rng(7).normal(0, 9, (rows // 4, columns // 80)).astype(np.float32)
-    grain = cv2.GaussianBlur(cv2.resize(grain, (columns, rows), interpolation=cv2.INTER_CUBIC), (0, 0), 1.5)
+    planks = np.random.default_rng(7).normal(0, 9, (rows // 4, columns // 80)).astype(np.float32)
+    grain = cv2.GaussianBlur(cv2.resize(planks, (columns, rows), interpolation=cv2.INTER_CUBIC), (0, 0), 1.5)
     texture = np.clip(texture + grain[..., None], 0, 255).astype(np.uint8)
 
     def polygon(xy: Floats, colour: Colour) -> None:
@@ -114,11 +116,13 @@ def _texture(config: SceneConfig, shift: Floats) -> NDArray[np.uint8]:
 
     length, width = config.table_m
     rail = config.rail_m[0]
-    polygon(_rectangle(shift + [0.006, -0.008], length + 2 * rail + 0.012, width + 2 * rail + 0.012), (62, 55, 48))
+    polygon(
+        _rectangle(shift + np.array([0.006, -0.008]), length + 2 * rail + 0.012, width + 2 * rail + 0.012), (62, 55, 48)
+    )
     polygon(_rectangle(shift, length, width), _SHEET)
     for x in np.arange(-length / 2 + 0.0125, length / 2, 0.025):
         for y in np.arange(-width / 2 + 0.0125, width / 2, 0.025):
-            circle(shift + [x, y], 0.0008, (170, 172, 174), 0)
+            circle(shift + np.array([x, y]), 0.0008, (170, 172, 174), 0)
     goal = np.asarray(config.goal_m[:2]) + shift
     angles = np.linspace(np.pi / 2, 3 * np.pi / 2, 90)
     arc = goal + config.goal_m[2] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
@@ -145,8 +149,8 @@ def _draw_markers(texture: NDArray[np.uint8], config: SceneConfig) -> None:
         side = markers.side_m / cells
         for row, column in zip(*np.nonzero(bits == 0), strict=True):
             offset = np.array([column - (cells - 1) / 2, (cells - 1) / 2 - row]) * side
-            low = _texel((centre + offset + [[-side / 2, side / 2]]))[0] >> _SHIFT
-            high = _texel((centre + offset + [[side / 2, -side / 2]]))[0] >> _SHIFT
+            low = _texel(centre + offset + np.array([[-side / 2, side / 2]]))[0] >> _SHIFT
+            high = _texel(centre + offset + np.array([[side / 2, -side / 2]]))[0] >> _SHIFT
             texture[low[1] + 1 : high[1] + 1, low[0] + 1 : high[0] + 1] = 28
 
 

@@ -23,21 +23,21 @@ Colour = tuple[float, float, float]
 class CameraConfig:
     """Intrinsics, place and exposure. fx and fy are those of a RealSense colour camera at 640x480."""
 
-    width: int = Field(640, ge=64, le=4096)
-    height: int = Field(480, ge=64, le=4096)
-    fx: float = Field(615.3, gt=0)
-    fy: float = Field(614.8, gt=0)
+    width: int = Field(default=640, ge=64, le=4096)
+    height: int = Field(default=480, ge=64, le=4096)
+    fx: float = Field(default=615.3, gt=0)
+    fy: float = Field(default=614.8, gt=0)
     cx: float = 322.4
     cy: float = 238.1
     distortion: tuple[float, ...] = (-0.085, 0.055, 0.0007, -0.0005, 0.0)
     """plumb_bob."""
     position_m: tuple[float, float, float] = (0.012, -0.055, 1.02)
     look_at_m: tuple[float, float, float] = (0.004, -0.002, 0.0)
-    roll_deg: float = Field(0.8, ge=-180, le=180)
-    rate_hz: int = Field(60, ge=1, le=240)
-    exposure_s: float = Field(0.004, ge=0, le=0.05)
-    sub_frames: int = Field(5, ge=1, le=32, description="moments of the exposure that are averaged")
-    noise: float = Field(2.5, ge=0, le=50, description="standard deviation of the sensor's noise [grey levels]")
+    roll_deg: float = Field(default=0.8, ge=-180, le=180)
+    rate_hz: int = Field(default=60, ge=1, le=240)
+    exposure_s: float = Field(default=0.004, ge=0, le=0.05)
+    sub_frames: int = Field(default=5, ge=1, le=32, description="moments of the exposure that are averaged")
+    noise: float = Field(default=2.5, ge=0, le=50, description="standard deviation of the sensor's noise [grey levels]")
 
 
 @dataclass(frozen=True, config=_strict)
@@ -45,9 +45,9 @@ class DiscConfig:
     """A round thing that moves."""
 
     colour: Colour
-    radius_m: float = Field(0.0255, gt=0)
-    height_m: float = Field(0.006, ge=0)
-    handle_m: float = Field(0.0, ge=0, description="height at which the arm holds its handle; 0: no handle")
+    radius_m: float = Field(default=0.0255, gt=0)
+    height_m: float = Field(default=0.006, ge=0)
+    handle_m: float = Field(default=0.0, ge=0, description="height at which the arm holds its handle; 0: no handle")
 
 
 @dataclass(frozen=True, config=_strict)
@@ -91,7 +91,7 @@ class SceneConfig:
     boxes: tuple[BoxConfig, ...] = (BoxConfig(centre_m=(0.1, 0.0), size_m=(0.025, 0.18, 0.015)),)
     discs: Mapping[str, DiscConfig] = Field(default_factory=_discs)
     arm: ArmConfig | None = Field(default_factory=ArmConfig)
-    light: float = Field(0.30, ge=0, le=0.9, description="share of light that is missing in the darkest corner")
+    light: float = Field(default=0.30, ge=0, le=0.9, description="share of light that is missing in the darkest corner")
 
 
 def scene_config(content: Mapping[str, object], where: str = "virtual camera") -> SceneConfig:
