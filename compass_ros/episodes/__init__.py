@@ -1,6 +1,7 @@
 """MCAP bag <-> Episode: crash-safe writing, recovery, reading of anybody's bags, import of tables.
 
-The bag is the only hand-over from a live cell to a calibration. One bag holds one episode.
+The bag is the only hand-over from a live cell to a calibration. One bag holds one episode. `tables.import_tables` and
+`recording.Recorder` are imported from where they are: a reader needs neither.
 """
 
 from compass_ros.episodes.episode_writer import write_episode
@@ -15,7 +16,6 @@ from compass_ros.episodes.reader import (
 )
 from compass_ros.episodes.recovery import Recovery, recover, unfinished
 from compass_ros.episodes.sources import Source, default_sources
-from compass_ros.episodes.tables import import_tables
 
 __all__ = [
     "BagContent",
@@ -24,7 +24,6 @@ __all__ = [
     "TopicSummary",
     "default_sources",
     "find_bags",
-    "import_tables",
     "list_topics",
     "read_bag",
     "read_episode",

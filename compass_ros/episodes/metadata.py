@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,8 +51,6 @@ def write_summary(folder: Path, summary: BagSummary) -> None:
     temporary = folder / (FILE_NAME + ".tmp")
     with temporary.open("w", encoding="utf-8") as file:
         file.write(summary_text(summary))
-        file.flush()
-        os.fsync(file.fileno())
     temporary.replace(folder / FILE_NAME)
 
 

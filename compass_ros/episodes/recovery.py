@@ -16,7 +16,7 @@ from compass_ros.episodes import mcap_stream, metadata
 from compass_ros.episodes.bag import RawMessage, RawTopic, decode, scan
 from compass_ros.episodes.definitions import EPISODE_TYPE, Definition, embedded_definition
 from compass_ros.episodes.notes import EPISODE_TOPIC, EpisodeHeader, header, header_bytes
-from compass_ros.episodes.writer import BagWriter
+from compass_ros.episodes.writer import BagWriter, sync_bag
 from compass_ros.errors import BagError
 
 _WORK_FOLDER = ".recovering"
@@ -52,6 +52,7 @@ def recover(path: str | Path) -> Recovery:
         try:
             shutil.rmtree(work, ignore_errors=True)
             kept = _rewrite(file, work)
+            sync_bag(work)
             (work / file.name).replace(file)
             (work / metadata.FILE_NAME).replace(folder / metadata.FILE_NAME)
         except OSError as error:

@@ -44,15 +44,22 @@ class _RecordFile:
     def tell(self) -> int:
         return self._end
 
-    def sync(self) -> None:
-        os.fdatasync(self._descriptor)
-
     def close(self) -> None:
         os.close(self._descriptor)
 
 
+def sync_bag(folder: Path) -> None:
+    """Wait until a bag is on the disk, for the case of a power cut. Takes as long as the disk takes. Raises OSError."""
+    for path in (*(file for file in folder.iterdir() if file.is_file()), folder):
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
 class BagWriter:
-    """One bag being written: FOLDER/NAME_0.mcap now, FOLDER/metadata.yaml when it is closed.
+    """One bag being written: FOLDER/NAME_0.mcap now, FOLDER/metadata.yaml when it is closed. See `sync_bag` for power cuts.
 
     The file's end and metadata.yaml are written by `close` only. Log times never decrease (readers rely on it): where
     the clock steps back the last log time is repeated, `clock_steps` counts it, the publish time stays as it was given.
@@ -146,7 +153,6 @@ class BagWriter:
         try:
             self._mcap.add_metadata("rosbag2", {"serialized_metadata": summary_text(summary)})
             self._mcap.finish()  # type: ignore[no-untyped-call]
-            self._file.sync()
             write_summary(self.folder, summary)
         except OSError as error:
             raise BagError(f"{self.folder}: cannot be finished: {error.strerror}") from error

@@ -1,0 +1,249 @@
+"""Recording of episodes, one bag each, without ROS: bytes come in, a status goes out."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+
+from compass_ros.episodes.definitions import EPISODE_TYPE, SHOT_TYPE, Definition, embedded_definition
+from compass_ros.episodes.names import episode_name, next_name
+from compass_ros.episodes.notes import EPISODE_TOPIC, SHOT_TOPIC, EpisodeHeader, Shot, State, header_bytes, shot_bytes
+from compass_ros.episodes.recovery import unfinished
+from compass_ros.episodes.writer import BagWriter
+from compass_ros.errors import BagError
+
+LOCK_FILE = ".recorder.lock"
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A topic that is received, with the type that it has now."""
+
+    topic: str
+    definition: Definition
+    qos: str = ""
+    """The publishers' QoS profiles as a YAML list."""
+
+
+@cache
+def _headers() -> Connection:
+    return Connection(EPISODE_TOPIC, embedded_definition(EPISODE_TYPE))
+
+
+@cache
+def _shots() -> Connection:
+    return Connection(SHOT_TOPIC, embedded_definition(SHOT_TYPE))
+
+
+@dataclass
+class _Losses:
+    """What an episode did not get; by topic."""
+
+    lost: dict[str, int] = field(default_factory=dict)
+    retyped: list[str] = field(default_factory=list)
+
+
+class Recorder:
+    """Writes one bag an episode into a folder that it holds alone.
+
+    Times are the caller's [ns]. A write that fails ends the episode: its bag stays without an end and can be recovered.
+    """
+
+    def __init__(self, folder: Path, min_free_bytes: int = 0, max_duration_ns: int = 0) -> None:
+        """Make the folder and take hold of it. `max_duration_ns`: an episode without an end is ended; 0: never.
+
+        Raises BagError: the folder cannot be written, or another recorder holds it.
+        """
+        self.folder = folder
+        self._min_free_bytes = min_free_bytes
+        self._max_duration_ns = max_duration_ns
+        self._lock = _hold(folder)
+        self._connections: dict[str, Connection] = {}
+        self._sequences: dict[str, int] = {}
+        self._writer: BagWriter | None = None
+        self._channels: dict[tuple[str, Definition], int] = {}
+        self._losses = _Losses()
+        self._start_ns = 0
+        self.status = EpisodeHeader(state="finished", episode="", message=self._unfinished())
+        """What became of the last episode, or how the present one stands. No name: there was none yet."""
+
+    @property
+    def recording(self) -> bool:
+        return self._writer is not None
+
+    def free_bytes(self) -> int:
+        """What the disk has left. Raises BagError when the folder is gone."""
+        try:
+            return shutil.disk_usage(self.folder).free
+        except OSError as error:
+            raise BagError(f"{self.folder}: {error.strerror}") from error
+
+    def connect(self, connection: Connection) -> None:
+        """A topic can be received now, or has changed its type."""
+        before = self._connections.get(connection.topic)
+        self._connections[connection.topic] = connection
+        self._sequences.pop(connection.topic, None)
+        if self._writer is not None:
+            if before is not None and before.definition != connection.definition:
+                change = f"{connection.topic} changed from {before.definition.type} to {connection.definition.type}"
+                self._losses.retyped.append(change)
+            self._declare(self._writer, connection)
+
+    def start(self, name: str, cell: str, cell_hash: str, action: Mapping[str, float], now_ns: int) -> EpisodeHeader:
+        """Begin an episode; an empty name is numbered. Raises BagError: one is running, bad name, no space, exists."""
+        if self._writer is not None:
+            raise BagError(f"episode {self.status.episode} is being recorded; stop or discard it first")
+        name = episode_name(name) if name else next_name(path.name for path in self.folder.iterdir())
+        free = self.free_bytes()
+        if free < self._min_free_bytes:
+            raise BagError(f"{self.folder}: {free / 1e6:.0f} MB left; expected {self._min_free_bytes / 1e6:.0f} MB")
+        writer = BagWriter(self.folder / name)
+        self._writer, self._channels, self._losses, self._start_ns = writer, {}, _Losses(), now_ns
+        self._sequences.clear()
+        self.status = EpisodeHeader("recording", name, cell, cell_hash, now_ns, bag=str(writer.folder))
+        for connection in (_headers(), *self._connections.values()):
+            self._declare(writer, connection)
+        self._write(
+            _headers(), now_ns, now_ns, header_bytes(replace(self.status, bag="", topics=tuple(self._connections)))
+        )
+        if action:
+            self._declare(writer, _shots())
+            self._write(_shots(), now_ns, now_ns, shot_bytes(Shot(now_ns, cell, action)))
+        return self.progress()
+
+    def take(self, topic: str, data: bytes, log_ns: int, publish_ns: int, sequence: int | None = None) -> None:
+        """One message of a connected topic; ignored between episodes.
+
+        Args:
+            sequence: The publisher's count of its messages, where the topic has one publisher: gaps are lost messages.
+
+        Raises:
+            BagError: The disk refuses; the episode is over and has failed.
+        """
+        if self._writer is None:
+            return
+        if sequence is not None:
+            gap = sequence - self._sequences.get(topic, sequence - 1) - 1
+            if gap > 0:
+                self._losses.lost[topic] = self._losses.lost.get(topic, 0) + gap
+            self._sequences[topic] = sequence
+        self._write(self._connections[topic], log_ns, publish_ns, data)
+
+    def overdue(self, now_ns: int) -> bool:
+        """Whether the episode has lasted longer than it may."""
+        return self.recording and 0 < self._max_duration_ns < now_ns - self._start_ns
+
+    def stop(self, why: str = "") -> EpisodeHeader:
+        """End the episode and make its bag whole. Raises BagError: none is running, or the disk refuses."""
+        writer = self._running()
+        said = self._described("finished", why)
+        self._write(_headers(), writer.last_ns, writer.last_ns, header_bytes(replace(said, bag="")))
+        try:
+            writer.close()
+        except BagError as error:
+            self._fail(error)
+            raise
+        self._writer = None
+        self.status = said
+        return said
+
+    def discard(self) -> EpisodeHeader:
+        """End the episode and delete its bag. Raises BagError: none is running, or the disk refuses."""
+        writer = self._running()
+        self.status = self._described("discarded")
+        self._writer = None
+        writer.delete()
+        return self.status
+
+    def close(self) -> None:
+        """Let go of the folder. An episode that is still running stays without an end and can be recovered."""
+        if self._writer is not None:
+            self._fail(BagError("the recorder was stopped in the middle of the episode"))
+        os.close(self._lock)
+
+    def progress(self) -> EpisodeHeader:
+        """The status now, with what was counted so far."""
+        if self.recording:
+            self.status = self._described("recording")
+        return self.status
+
+    def counts(self) -> dict[str, int]:
+        """Messages of the present episode by topic."""
+        return self._writer.counts() if self._writer is not None else {}
+
+    def problems(self) -> tuple[str, ...]:
+        """What went wrong in the present (or last) episode, one sentence each."""
+        lost = [f"lost {count} messages on {topic}" for topic, count in sorted(self._losses.lost.items())]
+        steps = self._writer.clock_steps if self._writer is not None else 0
+        stepped = [f"the clock stepped back {steps} time{'s' * (steps != 1)}"] if steps else []
+        return (*lost, *self._losses.retyped, *stepped)
+
+    def _running(self) -> BagWriter:
+        if self._writer is None:
+            last = f" (episode {self.status.episode} failed: {self.status.message})" * (self.status.state == "failed")
+            raise BagError(f"no episode is being recorded{last}")
+        return self._writer
+
+    def _declare(self, writer: BagWriter, connection: Connection) -> None:
+        key = (connection.topic, connection.definition)
+        if key not in self._channels:
+            self._channels[key] = writer.add_topic(connection.topic, connection.definition, connection.qos)
+
+    def _write(self, connection: Connection, log_ns: int, publish_ns: int, data: bytes) -> None:
+        try:
+            channel = self._channels[connection.topic, connection.definition]
+            self._running().write(channel, log_ns, publish_ns, data)
+        except BagError as error:
+            self._fail(error)
+            raise
+
+    def _fail(self, error: BagError) -> None:
+        writer = self._running()
+        message = f"{error}; run: compass record --recover {writer.folder}"
+        self.status = self._described("failed", message)
+        self._writer = None
+        writer.abandon()
+
+    def _described(self, state: State, message: str = "") -> EpisodeHeader:
+        """The status of the present episode, with what was counted so far."""
+        writer = self._running()
+        return replace(
+            self.status,
+            state=state,
+            duration_ns=writer.duration_ns,
+            messages=writer.messages,
+            topics=tuple(self._connections),
+            message="; ".join(filter(None, (message, *self.problems()))),
+        )
+
+    def _unfinished(self) -> str:
+        found = unfinished(self.folder)
+        if not found:
+            return ""
+        bags = " ".join(str(path) for path in found)
+        return f"{len(found)} bags have no end; run: compass record --recover {bags}"
+
+
+def _hold(folder: Path) -> int:
+    """Make a folder and lock it for this process; the lock falls when the process ends, however it ends."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
+    except OSError as error:
+        raise BagError(f"{folder}: cannot be written: {error.strerror}") from error
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        holder = os.read(descriptor, 20).decode(errors="replace") or "unknown"
+        os.close(descriptor)
+        raise BagError(
+            f"{folder}: another recorder (process {holder}) records here; give each its own folder"
+        ) from None
+    os.ftruncate(descriptor, 0)
+    os.write(descriptor, str(os.getpid()).encode())
+    return descriptor

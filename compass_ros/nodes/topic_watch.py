@@ -1,0 +1,139 @@
+"""Follows topics by name: finds their types and QoS, receives them raw, notices when a type changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from importlib import import_module
+
+import yaml
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from compass_ros.episodes.definitions import Definition, installed_definition
+from compass_ros.episodes.recording import Connection
+from compass_ros.errors import BagError
+
+Received = Callable[[str, bytes, int, int | None], None]
+"""Takes topic, bytes, publish time [ns], and the publisher's count of messages (None with several publishers)."""
+
+
+class TopicWatch:
+    """Raw subscriptions to topics that may come, go, and come back with another type."""
+
+    def __init__(
+        self,
+        node: Node,
+        topics: Sequence[str],
+        depth: int,
+        connected: Callable[[Connection], None],
+        received: Received,
+    ) -> None:
+        """`connected` is called when a topic is found and when its type changes, before its first message."""
+        self._node = node
+        self._topics = tuple(topics)
+        self._depth = depth
+        self._connected = connected
+        self._received = received
+        self._subscriptions: dict[str, Subscription] = {}
+        self._connections: dict[str, Connection] = {}
+        self._publishers: dict[str, int] = {}
+        self._problems: dict[str, str] = {}
+
+    def update(self) -> None:
+        """Look at the graph: subscribe to what is new, again to what has changed."""
+        for topic in self._topics:
+            publishers = self._node.get_publishers_info_by_topic(topic)
+            self._publishers[topic] = len(publishers)
+            if not publishers:
+                self._problems[topic] = f"{topic} has no publisher"
+                continue
+            self._problems.pop(topic, None)
+            try:
+                self._follow(topic, publishers)
+            except BagError as error:
+                self._problems[topic] = f"{topic} is not recorded: {error}"
+
+    def problems(self) -> tuple[str, ...]:
+        """What is not received, one sentence each."""
+        return tuple(self._problems.values())
+
+    def _follow(self, topic: str, publishers: Sequence[TopicEndpointInfo]) -> None:
+        """Keep the type that is received as long as anybody publishes it; else take another (the first by name)."""
+        types = {publisher.topic_type for publisher in publishers}
+        now = self._connections.get(topic)
+        if len(types) > 1:
+            self._problems[topic] = f"{topic} is published with {len(types)} types: {', '.join(sorted(types))}"
+        if now is not None and now.definition.type in types:
+            return
+        kind = min(types)
+        offered = [publisher for publisher in publishers if publisher.topic_type == kind]
+        definition, message_class = _definition(kind, offered), _class(kind)
+        if topic in self._subscriptions:
+            self._node.destroy_subscription(self._subscriptions.pop(topic))
+        self._connections[topic] = Connection(topic, definition, qos_yaml(offered))
+        self._connected(self._connections[topic])
+        receive = partial(self._receive, topic)
+        profile = matching_qos(offered, self._depth)
+        self._subscriptions[topic] = self._node.create_subscription(message_class, topic, receive, profile, raw=True)
+
+    def _receive(self, topic: str, data: bytes, info: Mapping[str, int | None]) -> None:
+        sequence = info["publication_sequence_number"] if self._publishers[topic] == 1 else None
+        self._received(topic, data, info["source_timestamp"] or 0, sequence)
+
+
+def matching_qos(publishers: Sequence[TopicEndpointInfo], depth: int) -> QoSProfile:
+    """The strongest profile that receives from all publishers."""
+    offered = [publisher.qos_profile for publisher in publishers]
+    reliable = all(qos.reliability == ReliabilityPolicy.RELIABLE for qos in offered)
+    latched = all(qos.durability == DurabilityPolicy.TRANSIENT_LOCAL for qos in offered)
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def qos_yaml(publishers: Sequence[TopicEndpointInfo]) -> str:
+    """QoS profiles as rosbag2 (version 9) writes them."""
+    return str(yaml.safe_dump([_profile(publisher.qos_profile) for publisher in publishers], sort_keys=False))
+
+
+def _profile(qos: QoSProfile) -> Mapping[str, object]:
+    def time(duration: Duration) -> Mapping[str, int]:
+        return dict(zip(("sec", "nsec"), divmod(duration.nanoseconds, 10**9), strict=True))
+
+    return {
+        "history": qos.history.name.lower(),
+        "depth": qos.depth,
+        "reliability": qos.reliability.name.lower(),
+        "durability": qos.durability.name.lower(),
+        "deadline": time(qos.deadline),
+        "lifespan": time(qos.lifespan),
+        "liveliness": qos.liveliness.name.lower(),
+        "liveliness_lease_duration": time(qos.liveliness_lease_duration),
+        "avoid_ros_namespace_conventions": qos.avoid_ros_namespace_conventions,
+    }
+
+
+def _definition(kind: str, publishers: Sequence[TopicEndpointInfo]) -> Definition:
+    """The installed definition. Raises BagError where there is none, or the publishers were built with another."""
+    definition = installed_definition(kind)
+    for publisher in publishers:
+        digest = str(publisher.topic_type_hash)
+        if digest.startswith("RIHS01_") and digest != definition.digest:
+            raise BagError(f"its publisher {publisher.node_name} was built with another definition of {kind}")
+    return definition
+
+
+def _class(kind: str) -> type:
+    """The message class of `package/msg/Name`. Raises BagError where its Python module is not installed."""
+    package, _, name = kind.split("/")
+    try:
+        return getattr(import_module(f"{package}.msg"), name)  # type: ignore[no-any-return]
+    except (ImportError, AttributeError) as error:
+        raise BagError(f"the Python module of {kind} is not installed: {error}") from error
