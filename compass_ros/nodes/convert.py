@@ -23,7 +23,7 @@ from std_msgs.msg import Header
 from compass_ros.nodes.job import Step
 
 Json = Mapping[str, Any]
-"""A part of result.json, whose JSON Schema has been checked when it was written."""
+"""A part of result.json, as `reporting.read_result` has checked it."""
 
 MODELS = ("nominal", "calibrated", "with_effects")
 EPISODES = ("fit", "held_out")
@@ -54,9 +54,9 @@ def graph_message(result: Json, header: Header) -> CausalGraph:
         header=header,
         parameters=graph["parameters"],
         factors=graph["factors"],
-        psi=[float(value) for row in graph["psi"] for value in row],
+        psi=[number(value) for row in graph["psi"] for value in row],
         threshold=float(graph["threshold"]),
-        sparsity=float(graph["sparsity"]),
+        sparsity=number(graph["sparsity"]),
     )
 
 
@@ -117,10 +117,13 @@ def gap_messages(gap: Json) -> list[Gap]:
 
 
 def mean_gap(result: Json, model: str) -> float:
-    """Mean trajectory difference over the factors [m], on held-out episodes where there are any, else on the fitted."""
-    gap = result["gap"][model]
-    found = gap.get("held_out") or gap["fit"]
-    return fmean(number(value) for value in found["d"].values())
+    """Mean trajectory difference over the factors [m], on held-out episodes where there are any, else on the fitted.
+
+    NaN for a model that was not fitted.
+    """
+    gap = result["gap"][model] or {}
+    found = gap.get("held_out") or gap.get("fit")
+    return fmean(number(value) for value in found["d"].values()) if found else math.nan
 
 
 def status_message(state: int, header: Header, step: Step | None = None, message: str = "") -> CalibrationStatus:
