@@ -1,0 +1,165 @@
+"""`result.json`: a `Result` for programs. Its JSON Schema lies beside this file."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+
+from compass_ros.errors import ConfigError
+from compass_ros.reporting.atomic import write_text
+from compass_ros.types import EffectFinding, Gap, Graph, Mismatch, ParameterRow, Result, Where
+
+SCHEMA_ID = "compass/result/1"
+
+
+@cache
+def schema() -> Mapping[str, Any]:
+    """The JSON Schema of `result.json`."""
+    text = resources.files("compass_ros.reporting").joinpath("result.schema.json").read_text(encoding="utf-8")
+    loaded: dict[str, Any] = json.loads(text)
+    return loaded
+
+
+def _number(value: float) -> float | None:
+    """JSON has no NaN and no infinity: both become null."""
+    return float(value) if math.isfinite(value) else None
+
+
+def _gap(gap: Gap | None) -> dict[str, Any] | None:
+    if gap is None:
+        return None
+    return {"d": {factor: _number(d) for factor, d in gap.d.items()}, "rmse_m": _number(gap.rmse_m)}
+
+
+def _parameter(row: ParameterRow) -> dict[str, Any]:
+    return {
+        "name": row.name,
+        "unit": row.unit,
+        "default": _number(row.default),
+        "value": _number(row.value),
+        "std": _number(row.std),
+        "bounds": [_number(bound) for bound in row.bounds],
+        "active": bool(row.active),
+        "identifiable": bool(row.identifiable),
+    }
+
+
+def _graph(graph: Graph) -> dict[str, Any]:
+    return {
+        "parameters": list(graph.parameters),
+        "factors": list(graph.factors),
+        "psi": [[_number(p) for p in row] for row in graph.psi],
+        "threshold": float(graph.threshold),
+        "sparsity": graph.sparsity if graph.psi.size else None,
+    }
+
+
+def _where(where: Where | None) -> dict[str, Any] | None:
+    if where is None:
+        return None
+    region = where.region
+    return {
+        "object": where.object,
+        "phase": where.phase,
+        "channel": where.channel,
+        "region": None
+        if region is None
+        else {"centre_m": [float(c) for c in region.centre_m], "radius_m": float(region.radius_m)},
+        "time_s": None if where.time_s is None else [float(t) for t in where.time_s],
+    }
+
+
+def _effect(effect: EffectFinding) -> dict[str, Any]:
+    return {
+        "name": effect.name,
+        "parameters": {
+            name: {"value": _number(p.value), "std": _number(p.std), "unit": p.unit}
+            for name, p in effect.parameters.items()
+        },
+        "evidence": {
+            "held_out_gain": _number(effect.evidence.held_out_gain),
+            "log_evidence": _number(effect.evidence.log_evidence),
+            "false_alarm_p": _number(effect.evidence.false_alarm_p),
+        },
+        "equivalents": list(effect.equivalents),
+    }
+
+
+def _mismatch(mismatch: Mismatch) -> dict[str, Any]:
+    return {
+        "verdict": mismatch.verdict,
+        "where": _where(mismatch.where),
+        "effects": [_effect(effect) for effect in mismatch.effects],
+        "undetectable": list(mismatch.undetectable),
+        "next_experiment": mismatch.next_experiment,
+        "sentence": mismatch.sentence,
+    }
+
+
+def to_json(result: Result) -> dict[str, Any]:
+    """The content of `result.json`: numbers that are not finite become null, models that were not fitted too.
+
+    Order and digits depend on the result alone.
+    """
+    gap: dict[str, Any] = {}
+    for model in ("nominal", "calibrated", "with_effects"):
+        parts = result.gap.get(model)
+        gap[model] = None if parts is None else {name: _gap(parts.get(name)) for name in ("fit", "held_out")}
+    gap["noise_floor_m"] = _number(result.noise_floor_m)
+    return {
+        "schema": SCHEMA_ID,
+        "cell": result.cell,
+        "method": result.method,
+        "seed": int(result.seed),
+        "cancelled": bool(result.cancelled),
+        "warnings": list(result.warnings),
+        "versions": dict(sorted(result.versions.items())),
+        "budget": {
+            "rollouts": int(result.budget.rollouts),
+            "simulated_seconds": _number(result.budget.simulated_seconds),
+            "wall_seconds": _number(result.budget.wall_seconds),
+        },
+        "episodes": {"fit": list(result.fit), "held_out": list(result.held_out)},
+        "gap": gap,
+        "parameters": [_parameter(row) for row in result.parameters],
+        "graph": _graph(result.graph),
+        "mismatch": _mismatch(result.mismatch),
+    }
+
+
+def write_result(result: Result, path: Path) -> None:
+    """Write `result.json`; the file is whole or not there. Raises ConfigError when it cannot be written."""
+    write_text(Path(path), json.dumps(to_json(result), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def read_result(path: Path) -> dict[str, Any]:
+    """The validated content of a `result.json`. Raises ConfigError naming the field, what was expected and found."""
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(f"{path}: not valid JSON: {' '.join(str(error).split())}") from error
+    problem = jsonschema.exceptions.best_match(jsonschema.Draft202012Validator(schema()).iter_errors(content))
+    if problem is not None:
+        field = ".".join(str(part) for part in problem.absolute_path) or "top level"
+        text = " ".join(problem.message.split())
+        raise ConfigError(f"{path}: not a {SCHEMA_ID}: {field}: {text[:200]}{'...' if len(text) > 200 else ''}")
+    _check_graph(content["graph"], path)
+    valid: dict[str, Any] = content
+    return valid
+
+
+def _check_graph(graph: Mapping[str, Any], path: Path) -> None:
+    """The shape of psi, which a schema cannot hold."""
+    rows, columns = len(graph["parameters"]), len(graph["factors"])
+    if graph["psi"] and (len(graph["psi"]) != rows or any(len(row) != columns for row in graph["psi"])):
+        found = f"{len(graph['psi'])} x {len(graph['psi'][0])}"
+        raise ConfigError(f"{path}: graph.psi: expected {rows} parameters x {columns} factors, found {found}")

@@ -1,0 +1,91 @@
+"""The result in a terminal: what was wrong, by how much it is better, what is left."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from compass_ros.reporting.checks import SUMMARY, assess, overall
+from compass_ros.reporting.numbers import MISSING, millimetres, plain, unit_text, value_pm
+from compass_ros.reporting.words import (
+    MODEL_LABEL,
+    MODELS,
+    VERDICT_LEVEL,
+    VERDICT_TITLE,
+    Level,
+    fit_rmse,
+    held_out_rmse,
+)
+from compass_ros.types import ParameterRow, Result
+
+STYLE: Mapping[Level, str] = {"good": "bold green", "note": "dim", "care": "bold yellow", "bad": "bold red"}
+
+
+def print_result(result: Result, truth: Mapping[str, float] | None = None, console: Console | None = None) -> None:
+    """Print the active parameters (with the truth where known), the gap, the checks that need attention, the verdict.
+
+    Names are printed as they are: markup in them has no effect.
+    """
+    out = console or Console()
+    out.print(parameter_table(result, truth or {}))
+    out.print(gap_table(result))
+    checks = assess(result)
+    level = overall(checks)
+    for check in checks:
+        if check.level in ("care", "bad"):
+            out.print(Text.assemble((f"{check.title}. ", STYLE[check.level]), check.detail))
+    out.print(Text(f"Is the result good? {SUMMARY[level]}", STYLE[level]))
+    verdict = result.mismatch.verdict
+    out.print(Text.assemble((f"{VERDICT_TITLE[verdict]}: ", STYLE[VERDICT_LEVEL[verdict]]), result.mismatch.sentence))
+    if result.mismatch.next_experiment:
+        out.print(Text.assemble(("Next experiment: ", "bold"), result.mismatch.next_experiment))
+
+
+def parameter_table(result: Result, truth: Mapping[str, float]) -> Table:
+    """Active parameters and those whose truth differs from the default, in the order of the cell."""
+    shown = [row for row in result.parameters if row.active or truth.get(row.name, row.default) != row.default]
+    hidden = len(result.parameters) - len(shown)
+    caption = Text(f"{hidden} further parameters have no edge and keep their defaults" if hidden else "", "dim")
+    table = Table(caption=caption, caption_justify="left")
+    table.add_column("parameter", overflow="fold")
+    table.add_column("default", justify="right")
+    table.add_column("found", justify="right")
+    if truth:
+        table.add_column("truth", justify="right")
+    table.add_column("unit")
+    for row in shown:
+        cells = [Text(row.name), Text(plain(row.default)), _found(row)]
+        if truth:
+            cells.append(Text(plain(truth[row.name]) if row.name in truth else MISSING))
+        table.add_row(*cells, Text(unit_text(row.unit)))
+    return table
+
+
+def _found(row: ParameterRow) -> Text:
+    if not row.active:
+        return Text(f"{plain(row.value)} (no edge)", "dim")
+    doubt = "" if row.identifiable else " ?"
+    return Text(value_pm(row.value, row.std) + doubt, "bold" if row.identifiable else "dim")
+
+
+def gap_table(result: Result) -> Table:
+    """Root mean square distance of each model, and its ratio to the nominal one and to the noise floor."""
+    floor = result.noise_floor_m
+    table = Table(caption=Text(f"noise floor {millimetres(floor)} mm", "dim"), caption_justify="left")
+    for heading in ("simulator", "held out [mm]", "of nominal", "of floor", "fitted [mm]"):
+        table.add_column(Text(heading), justify="left" if heading == "simulator" else "right")
+    nominal = held_out_rmse(result, "nominal")
+    for model in MODELS:
+        if model in result.gap:
+            error = held_out_rmse(result, model)
+            ratios = [_ratio(error, nominal), _ratio(error, floor)]
+            table.add_row(MODEL_LABEL[model], millimetres(error), *ratios, millimetres(fit_rmse(result, model)))
+    return table
+
+
+def _ratio(error: float, base: float) -> str:
+    return f"{error / base:.2f}" if math.isfinite(error) and math.isfinite(base) and base > 0 else MISSING

@@ -1,0 +1,1 @@
+"""A `Result` in the words and numbers that the report prints."""

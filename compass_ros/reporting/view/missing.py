@@ -1,0 +1,47 @@
+"""The answer to what is left: fitted effects and the candidates that were tried."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from compass_ros.reporting.extras import Candidate
+from compass_ros.reporting.numbers import percent, plain, probability, unit_text, value_pm
+from compass_ros.types import EffectFinding, Result
+
+
+def effect(finding: EffectFinding) -> dict[str, Any]:
+    """One fitted effect."""
+    return {
+        "name": finding.name,
+        "parameters": [
+            {"name": name, "value": value_pm(p.value, p.std), "unit": unit_text(p.unit)}
+            for name, p in finding.parameters.items()
+        ],
+        "gain": percent(finding.evidence.held_out_gain),
+        "evidence": plain(finding.evidence.log_evidence, 3),
+        "p": probability(finding.evidence.false_alarm_p),
+        "equivalents": finding.equivalents,
+    }
+
+
+def ranking(result: Result, candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
+    """Candidates by evidence, best first; from the findings alone where discovery handed over no list."""
+    rows = candidates or tuple(
+        Candidate(e.name, "", e.evidence.log_evidence, e.evidence.held_out_gain, True) for e in result.mismatch.effects
+    )
+    ordered = sorted(rows, key=lambda c: (-c.log_evidence if math.isfinite(c.log_evidence) else math.inf, c.name))
+    top = max((c.log_evidence for c in ordered if math.isfinite(c.log_evidence)), default=0.0)
+    return [
+        {
+            "name": c.name,
+            "channel": c.channel,
+            "evidence": plain(c.log_evidence, 3),
+            "bar": round(100 * max(c.log_evidence, 0.0) / top, 1) if top > 0 and math.isfinite(c.log_evidence) else 0,
+            "gain": percent(c.held_out_gain),
+            "kept": c.kept,
+            "note": c.note,
+        }
+        for c in ordered
+    ]

@@ -1,0 +1,89 @@
+"""A `Result` in the words and numbers that the report's template prints. Pure; nothing is escaped here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from compass_ros.reporting.checks import SUMMARY, assess, overall
+from compass_ros.reporting.extras import ReportExtras
+from compass_ros.reporting.numbers import duration, typeset
+from compass_ros.reporting.view.gap import episodes, factor_table, ladder
+from compass_ros.reporting.view.missing import effect, ranking
+from compass_ros.reporting.view.parameters import active_rows, graph_rows, parameter
+from compass_ros.reporting.words import (
+    MODEL_LABEL,
+    MODELS,
+    VERDICT_LEVEL,
+    VERDICT_MEANING,
+    VERDICT_TITLE,
+    Level,
+    where_rows,
+)
+from compass_ros.types import Result
+
+READING_ORDER: tuple[Level, ...] = ("bad", "care", "good", "note")
+"""What needs a reader's attention comes first."""
+
+
+def questions(result: Result) -> list[dict[str, Any]]:
+    """The three questions of the suite with their short answers."""
+    active = active_rows(result)
+    firm = sum(row.identifiable for row in active)
+    names = [effect.name for effect in result.mismatch.effects]
+    return [
+        {
+            "question": "Which parameters?",
+            "answer": f"{len(active)} of {len(result.parameters)}",
+            "detail": "have an edge in the causal graph",
+            "link": "causes",
+        },
+        {
+            "question": "Which values?",
+            "answer": f"{firm} pinned down",
+            "detail": f"{len(active) - firm} active ones are not identifiable"
+            if firm < len(active)
+            else "with an error bar each",
+            "link": "parameters",
+        },
+        {
+            "question": "What is left?",
+            "answer": " + ".join(names) if names else VERDICT_TITLE[result.mismatch.verdict],
+            "detail": VERDICT_MEANING[result.mismatch.verdict],
+            "link": "missing",
+        },
+    ]
+
+
+def view(result: Result, extras: ReportExtras) -> dict[str, Any]:
+    """Everything that the template prints, by name."""
+    checks = sorted(assess(result), key=lambda check: READING_ORDER.index(check.level))
+    level = overall(checks)
+    mismatch = result.mismatch
+    active = active_rows(result)
+    inactive = [r for r in result.parameters if not r.active]
+    return {
+        "result": result,
+        "sentence": typeset(mismatch.sentence),
+        "verdict": {"level": VERDICT_LEVEL[mismatch.verdict], "title": VERDICT_TITLE[mismatch.verdict]},
+        "ladder": ladder(result),
+        "questions": questions(result),
+        "checks": checks,
+        "trust": {"level": level, "summary": SUMMARY[level]},
+        "factor_table": factor_table(result),
+        "models": [MODEL_LABEL[m] for m in MODELS],
+        "episodes": episodes(result),
+        "graph": graph_rows(result),
+        "active": [parameter(row, extras.truth.get(row.name)) for row in active],
+        "inactive": [parameter(row, extras.truth.get(row.name)) for row in inactive],
+        "with_truth": bool(extras.truth),
+        "meaning": VERDICT_MEANING[mismatch.verdict],
+        "where": where_rows(mismatch.where) if mismatch.where is not None else (),
+        "effects": [effect(e) for e in mismatch.effects],
+        "ranking": ranking(result, extras.candidates),
+        "command": extras.command,
+        "budget": [
+            ("rollouts", f"{result.budget.rollouts:,}".replace(",", " ")),
+            ("simulated", duration(result.budget.simulated_seconds)),
+            ("took", duration(result.budget.wall_seconds)),
+        ],
+    }

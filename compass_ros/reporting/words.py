@@ -1,0 +1,107 @@
+"""The suite's words for the values that `types.py` spells as literals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+from compass_ros.reporting.numbers import MINUS, millimetres
+from compass_ros.types import Phase, Result, Verdict, Where
+
+Level = Literal["good", "note", "care", "bad"]
+Model = Literal["nominal", "calibrated", "with_effects"]
+
+MODELS: tuple[Model, ...] = ("nominal", "calibrated", "with_effects")
+
+MODEL_LABEL: Mapping[Model, str] = {
+    "nominal": "nominal",
+    "calibrated": "calibrated",
+    "with_effects": "with effects",
+}
+
+VERDICT_TITLE: Mapping[Verdict, str] = {
+    "none": "Nothing is missing",
+    "named": "Missing physics named",
+    "ambiguous": "Missing physics, two readings",
+    "unknown": "Something unknown is missing",
+    "fit_failed": "The fit failed",
+    "data_bad": "The recordings are bad",
+    "not_evaluated": "Not evaluated",
+}
+
+VERDICT_LEVEL: Mapping[Verdict, Level] = {
+    "none": "good",
+    "named": "good",
+    "ambiguous": "care",
+    "unknown": "care",
+    "fit_failed": "bad",
+    "data_bad": "bad",
+    "not_evaluated": "care",
+}
+
+VERDICT_MEANING: Mapping[Verdict, str] = {
+    "none": "What is left after the calibration is no more than the noise of the recordings.",
+    "named": "A known effect explains what the calibrated simulator leaves over.",
+    "ambiguous": "An effect is there, but these recordings cannot tell its candidates apart.",
+    "unknown": "Something is there, and none of the known effects explains it.",
+    "fit_failed": "The fit reached neither the noise floor nor agreement with a second start, so nothing is named.",
+    "data_bad": "The recordings cannot answer the question, so nothing is named.",
+    "not_evaluated": "Nobody looked for missing physics here. This is not a pass.",
+}
+
+PHASE: Mapping[Phase, str] = {
+    "strike": "at the strike",
+    "free": "on free slides",
+    "wall_contact": "at wall contacts",
+    "object_contact": "at contacts between objects",
+    "all": "in every phase",
+}
+
+CHANNEL: Mapping[str, str] = {
+    "dynamics": "dynamics: a force while moving",
+    "contact": "contact: what happens when things touch",
+    "actuation": "actuation: from command to motion",
+    "sensing": "sensing: from motion to measurement",
+    "all": "no single channel",
+}
+
+
+def best_model(result: Result) -> Model:
+    """The most complete model that was fitted."""
+    return "with_effects" if "with_effects" in result.gap else "calibrated"
+
+
+def held_out_rmse(result: Result, model: Model) -> float:
+    """Held-out root mean square distance of a model [m]; NaN where there is none."""
+    gap = result.gap.get(model, {}).get("held_out")
+    return gap.rmse_m if gap is not None else float("nan")
+
+
+def fit_rmse(result: Result, model: Model) -> float:
+    """Root mean square distance of a model on the fitted episodes [m]; NaN where there is none."""
+    gap = result.gap.get(model, {}).get("fit")
+    return gap.rmse_m if gap is not None else float("nan")
+
+
+def gap_line(result: Result) -> str:
+    """`held-out error 51 mm nominal -> 5.1 mm calibrated -> 1.2 mm with effects; noise floor 1.0 mm`."""
+    steps = [
+        f"{millimetres(held_out_rmse(result, model))} mm {MODEL_LABEL[model]}"
+        for model in MODELS
+        if model in result.gap
+    ]
+    return f"held-out error {' → '.join(steps)}; noise floor {millimetres(result.noise_floor_m)} mm"
+
+
+def where_rows(where: Where) -> tuple[tuple[str, str], ...]:
+    """What, in words, for each field of `where` that says something."""
+    rows = [("object", "all objects" if where.object == "all" else where.object), ("phase", PHASE[where.phase])]
+    rows.append(("channel", CHANNEL[where.channel]))
+    if where.region is not None:
+        x, y = where.region.centre_m
+        rows.append(
+            ("region", f"within {where.region.radius_m * 100:.0f} cm of ({x:.3f}, {y:.3f}) m".replace("-", MINUS))
+        )
+    if where.time_s is not None:
+        rows.append(("time", f"{where.time_s[0]:.2f} to {where.time_s[1]:.2f} s after the command"))
+    return tuple(rows)

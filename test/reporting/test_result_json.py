@@ -1,0 +1,190 @@
+"""result.json: the schema, the round trip, and files that are none."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, get_args
+
+import jsonschema
+import numpy as np
+import pytest
+
+from compass_ros.errors import ConfigError
+from compass_ros.reporting.result_json import read_result, schema, to_json, write_result
+from compass_ros.types import Gap, Graph, Result, Verdict
+
+CONTRACT = {
+    "": ("schema", "cell", "seed", "versions", "budget", "episodes", "gap", "parameters", "graph", "mismatch"),
+    "budget": ("rollouts", "simulated_seconds", "wall_seconds"),
+    "episodes": ("fit", "held_out"),
+    "gap": ("nominal", "calibrated", "with_effects", "noise_floor_m"),
+    "gap.nominal": ("fit", "held_out"),
+    "gap.nominal.fit": ("d", "rmse_m"),
+    "parameters.0": ("name", "unit", "default", "value", "std", "bounds", "active", "identifiable"),
+    "graph": ("parameters", "factors", "psi", "threshold", "sparsity"),
+    "mismatch": ("verdict", "where", "effects", "undetectable", "next_experiment", "sentence"),
+    "mismatch.where": ("object", "phase", "channel", "region", "time_s"),
+    "mismatch.where.region": ("centre_m", "radius_m"),
+    "mismatch.effects.0": ("name", "parameters", "evidence", "equivalents"),
+    "mismatch.effects.0.parameters.strength": ("value", "std", "unit"),
+    "mismatch.effects.0.evidence": ("held_out_gain", "log_evidence", "false_alarm_p"),
+}
+"""The fields that the design names, by the path of the object that holds them."""
+
+
+def holder(content: Any, path: str) -> Any:
+    for part in filter(None, path.split(".")):
+        content = content[int(part)] if part.isdigit() else content[part]
+    return content
+
+
+def valid(content: object) -> bool:
+    return bool(jsonschema.Draft202012Validator(schema()).is_valid(content))
+
+
+def test_schema_is_a_schema() -> None:
+    jsonschema.Draft202012Validator.check_schema(schema())
+
+
+@pytest.mark.parametrize("verdict", get_args(Verdict))
+def test_every_verdict_fits_the_schema(verdict: Verdict, make_result: Callable[[Verdict], Result]) -> None:
+    content = to_json(make_result(verdict))
+    jsonschema.Draft202012Validator(schema()).validate(content)
+    assert content["schema"] == "compass/result/1"
+    assert content["mismatch"]["verdict"] == verdict
+
+
+@pytest.mark.parametrize(("path", "field"), [(path, field) for path, fields in CONTRACT.items() for field in fields])
+def test_no_field_of_the_contract_may_miss(path: str, field: str, result: Result) -> None:
+    content = to_json(result)
+    del holder(content, path)[field]
+    assert not valid(content)
+
+
+@pytest.mark.parametrize(
+    ("path", "field", "wrong"),
+    [
+        ("", "schema", "compass/result/2"),
+        ("", "seed", 1.5),
+        ("mismatch", "verdict", "perhaps"),
+        ("mismatch.where", "phase", "flying"),
+        ("mismatch.where", "channel", "magic"),
+        ("parameters.0", "bounds", [0.0]),
+        ("graph", "sparsity", 1.2),
+        ("gap.nominal.fit", "rmse_m", -0.1),
+        ("mismatch.effects.0.evidence", "false_alarm_p", 2.0),
+    ],
+)
+def test_wrong_values_are_refused(path: str, field: str, wrong: object, result: Result) -> None:
+    content = to_json(result)
+    holder(content, path)[field] = wrong
+    assert not valid(content)
+
+
+def test_further_fields_are_allowed(result: Result) -> None:
+    content = to_json(result)
+    for path in CONTRACT:
+        holder(content, path)["added_later"] = {"value": 1, "std": 1, "unit": "m"} if path.endswith("parameters") else 1
+    assert valid(content)
+
+
+def test_round_trip(tmp_path: Path, result: Result) -> None:
+    path = tmp_path / "deep" / "result.json"
+    write_result(result, path)
+    content = read_result(path)
+    assert content == to_json(result)
+    assert content["graph"]["psi"] == result.graph.psi.tolist()
+    assert content["gap"]["with_effects"]["held_out"]["rmse_m"] == result.gap["with_effects"]["held_out"].rmse_m
+    row = result.parameters[0]
+    assert content["parameters"][0]["value"] == row.value
+    assert content["parameters"][0]["bounds"] == list(row.bounds)
+    assert [p.name for p in path.parent.iterdir()] == ["result.json"]
+
+
+def test_same_result_same_bytes(tmp_path: Path, make_result: Callable[[Verdict], Result]) -> None:
+    write_result(make_result("named"), tmp_path / "a.json")
+    write_result(make_result("named"), tmp_path / "b.json")
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+
+
+def test_what_is_not_finite_or_not_there_is_null(result: Result) -> None:
+    row = replace(result.parameters[0], std=float("nan"), value=float("inf"))
+    bare = replace(
+        result,
+        parameters=(row,),
+        noise_floor_m=float("nan"),
+        gap={"nominal": {"fit": Gap({"puck1": float("nan")}, float("nan"))}},
+        graph=Graph((), (), np.zeros((0, 0)), 0.5),
+    )
+    content = to_json(bare)
+    assert content["parameters"][0]["std"] is None
+    assert content["parameters"][0]["value"] is None
+    assert content["gap"] == {
+        "nominal": {"fit": {"d": {"puck1": None}, "rmse_m": None}, "held_out": None},
+        "calibrated": None,
+        "with_effects": None,
+        "noise_floor_m": None,
+    }
+    assert content["graph"]["sparsity"] is None
+    json.dumps(content, allow_nan=False)
+    assert valid(content)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", "not valid JSON"),
+        ('{"schema": "compass/result/1"', "not valid JSON"),
+        ("[1, 2]", "not a compass/result/1"),
+        ('{"schema": "other/1"}', "not a compass/result/1"),
+        ("[" * 100_000, "not valid JSON"),
+    ],
+)
+def test_a_file_that_is_no_result(tmp_path: Path, text: str, expected: str) -> None:
+    path = tmp_path / "result.json"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=expected) as caught:
+        read_result(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_binary(tmp_path: Path) -> None:
+    path = tmp_path / "result.json"
+    path.write_bytes(b"\x89PNG\xff\xfe")
+    with pytest.raises(ConfigError, match="not valid JSON"):
+        read_result(path)
+
+
+def test_the_message_names_the_field(tmp_path: Path, result: Result) -> None:
+    content = to_json(result)
+    content["mismatch"]["verdict"] = "perhaps"
+    path = tmp_path / "result.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(ConfigError, match=r"mismatch\.verdict: 'perhaps' is not one of"):
+        read_result(path)
+
+
+def test_psi_of_the_wrong_shape(tmp_path: Path, result: Result) -> None:
+    content = to_json(result)
+    content["graph"]["psi"].pop()
+    path = tmp_path / "result.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(ConfigError, match="expected 64 parameters x 2 factors"):
+        read_result(path)
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="cannot be read"):
+        read_result(tmp_path / "nothing.json")
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path: Path, result: Result) -> None:
+    path = tmp_path / "result.json"
+    path.mkdir()
+    with pytest.raises(ConfigError, match="cannot be written"):
+        write_result(result, path)
+    assert [p.name for p in tmp_path.iterdir()] == ["result.json"]
