@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import threading
 from pathlib import Path
@@ -24,16 +23,15 @@ from std_srvs.srv import Trigger
 from compass_ros.errors import CompassError, ConfigError
 from compass_ros.nodes import convert
 from compass_ros.nodes.job import Job, Outcome, Request
+from compass_ros.reporting.result_json import read_result
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 POLL_S = 0.05
 """[s] How often a running calibration is looked at: delay of its progress and of a cancel."""
 
-STATES = {
-    Outcome.SUCCEEDED: CalibrationStatus.SUCCEEDED,
-    Outcome.FAILED: CalibrationStatus.FAILED,
-    Outcome.CANCELLED: CalibrationStatus.CANCELLED,
-}
+
+class BusyError(CompassError):
+    """A calibration is running, and another one was asked for."""
 
 
 class Calibrator(Node):
@@ -108,7 +106,7 @@ class Calibrator(Node):
         )
 
     def _begin(self, goal: Calibrate.Goal) -> Job:
-        """Raises ConfigError when a calibration is running, or when this one cannot start."""
+        """Raises BusyError when a calibration is running, ConfigError when this one cannot start."""
         with self._claim:
             self._refuse_a_second()
             self._running = Job.start(self._request(goal))
@@ -117,29 +115,44 @@ class Calibrator(Node):
 
     def _refuse_a_second(self) -> None:
         if self._running is not None:
-            raise ConfigError(f"refused: a calibration is already running ({self._status.share_done:.0%} done)")
+            raise BusyError(f"refused: a calibration is already running ({self._status.share_done:.0%} done)")
 
     def _execute(self, handle: ServerGoalHandle) -> Calibrate.Result:
         try:
             job = self._begin(handle.request)
-        except CompassError as error:
-            self.get_logger().error(str(error))
+        except BusyError as error:  # the running one keeps the status
             handle.abort()
             return self._without_result(str(error))
+        except CompassError as error:
+            return self._fail(handle, str(error))
         try:
             self._follow(job, handle)
+            return self._end(handle, job)
+        except CompassError as error:
+            return self._fail(handle, str(error))
         finally:
             self._running = None
-        self._say(convert.status_message(STATES[job.outcome], self._header(), message=job.message))
-        if job.outcome is Outcome.SUCCEEDED:
-            handle.succeed()
-            return self._publish(job.output / "result.json", job.message)
-        if job.outcome is Outcome.CANCELLED and handle.is_cancel_requested:
+
+    def _end(self, handle: ServerGoalHandle, job: Job) -> Calibrate.Result:
+        """Say how a job has ended. Raises ConfigError when its result cannot be read."""
+        if not rclpy.ok(context=self.context):
+            return self._without_result(job.message)  # nobody can be told any more
+        if job.outcome is Outcome.FAILED:
+            return self._fail(handle, job.message)
+        if job.outcome is Outcome.CANCELLED:
+            self._say(convert.status_message(CalibrationStatus.CANCELLED, self._header(), message=job.message))
             handle.canceled()
-        elif rclpy.ok(context=self.context):
-            self.get_logger().error(job.message)
-            handle.abort()
-        return self._without_result(job.message)
+            return self._without_result(job.message)
+        answer = self._publish(job.output / "result.json", job.message)
+        self._say(convert.status_message(CalibrationStatus.SUCCEEDED, self._header(), message=job.message))
+        handle.succeed()
+        return answer
+
+    def _fail(self, handle: ServerGoalHandle, message: str) -> Calibrate.Result:
+        self.get_logger().error(message)
+        self._say(convert.status_message(CalibrationStatus.FAILED, self._header(), message=message))
+        handle.abort()
+        return self._without_result(message)
 
     def _follow(self, job: Job, handle: ServerGoalHandle) -> None:
         """Hand on progress until the job has ended; a cancel, or the end of the node, ends it."""
@@ -155,8 +168,8 @@ class Calibrator(Node):
                 handle.publish_feedback(feedback)
 
     def _publish(self, path: Path, message: str) -> Calibrate.Result:
-        """The result as topics and as the action's answer."""
-        result = json.loads(path.read_text(encoding="utf-8"))
+        """The result as topics and as the action's answer. Raises ConfigError when it cannot be read."""
+        result = read_result(path)
         header = self._header("table")
         self._parameters_topic.publish(convert.parameters_message(result, header, str(path)))
         self._graph_topic.publish(convert.graph_message(result, header))
