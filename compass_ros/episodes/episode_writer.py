@@ -31,6 +31,7 @@ from compass_ros.episodes.notes import (
 )
 from compass_ros.episodes.sources import Source, default_sources
 from compass_ros.episodes.writer import BagWriter
+from compass_ros.errors import BagError
 from compass_ros.types import Episode, Floats, Track
 
 SHOT_OUT_TOPIC = "/virtual_cell/shot"
@@ -55,27 +56,27 @@ def write_episode(episode: Episode, folder: str | Path, sources: Sequence[Source
         (message for track in episode.tracks for message in _track_messages(track, found[track.object])),
         key=lambda message: message[0],
     )
-    writer = BagWriter(Path(folder) / episode_name(episode.name))
-    channels = {EPISODE_TOPIC: writer.add_topic(EPISODE_TOPIC, embedded_definition(EPISODE_TYPE))}
-    channels[NOTES_TOPIC] = writer.add_topic(NOTES_TOPIC, embedded_definition(STRING_TYPE))
-    channels[SHOT_OUT_TOPIC] = writer.add_topic(SHOT_OUT_TOPIC, embedded_definition(SHOT_TYPE))
-    for track in episode.tracks:
-        topic = found[track.object].topic
-        if topic not in channels:
-            channels[topic] = writer.add_topic(topic, embedded_definition(_message_type(track)))
+    types = {EPISODE_TOPIC: EPISODE_TYPE, NOTES_TOPIC: STRING_TYPE, SHOT_OUT_TOPIC: SHOT_TYPE}
+    types |= {found[track.object].topic: _message_type(track) for track in episode.tracks}
     start_ns = min([episode.start_ns, *(stamp for stamp, _, _ in messages[:1])])
     first = [
-        (start_ns, EPISODE_TOPIC, header_bytes(_header(episode, channels, messages))),
+        (start_ns, EPISODE_TOPIC, header_bytes(_header(episode, tuple(types), messages))),
         (start_ns, NOTES_TOPIC, notes_bytes(_notes(episode))),
         (start_ns, SHOT_OUT_TOPIC, shot_bytes(Shot(episode.start_ns, episode.cell, episode.action))),
     ]
-    for stamp_ns, topic, data in [*first, *messages]:
-        writer.write(channels[topic], stamp_ns, stamp_ns, data)
+    writer = BagWriter(Path(folder) / episode_name(episode.name))
+    channels = {topic: writer.add_topic(topic, embedded_definition(kind)) for topic, kind in types.items()}
+    try:
+        for stamp_ns, topic, data in [*first, *messages]:
+            writer.write(channels[topic], stamp_ns, stamp_ns, data)
+    except BagError:
+        writer.abandon()
+        raise
     writer.close()
     return writer.folder
 
 
-def _header(episode: Episode, topics: dict[str, int], messages: Sequence[tuple[int, str, bytes]]) -> EpisodeHeader:
+def _header(episode: Episode, topics: tuple[str, ...], messages: Sequence[tuple[int, str, bytes]]) -> EpisodeHeader:
     return EpisodeHeader(
         state="finished",
         episode=episode.name,
@@ -84,7 +85,7 @@ def _header(episode: Episode, topics: dict[str, int], messages: Sequence[tuple[i
         start_ns=episode.start_ns,
         duration_ns=max(messages[-1][0] - episode.start_ns, 0) if messages else 0,
         messages=len(messages),
-        topics=tuple(topics),
+        topics=topics,
     )
 
 

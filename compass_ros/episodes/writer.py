@@ -59,7 +59,7 @@ def sync_bag(folder: Path) -> None:
 
 
 class BagWriter:
-    """One bag being written: FOLDER/NAME_0.mcap now, FOLDER/metadata.yaml when it is closed. See `sync_bag` for power cuts.
+    """One bag being written: FOLDER/NAME_0.mcap now, FOLDER/metadata.yaml when it is closed.
 
     The file's end and metadata.yaml are written by `close` only. Log times never decrease (readers rely on it): where
     the clock steps back the last log time is repeated, `clock_steps` counts it, the publish time stays as it was given.
