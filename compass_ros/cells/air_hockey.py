@@ -81,10 +81,10 @@ class AirHockey:
         return positions, np.zeros((len(values), self._model.nv))
 
     def controls(self, values: Floats, inputs: Floats, steps: int) -> Floats:
-        """Velocity of the pusher: up in `ramp_time`, constant until the commanded stroke is done, down in `settle_time`.
+        """Velocity of the pusher: up in `ramp_time`, constant until the commanded stroke is done, then back out of the way.
 
         The heading is the line from the pusher's start to puck 1, turned by the commanded angle. The stroke is timed by
-        the commanded speed; the arm reaches only `vel_discount` of it.
+        the commanded speed; the arm reaches only `vel_discount` of it. The turn at the end takes `settle_time`.
         """
         discount, ramp, stroke, settle = (
             values[:, self._cell.index(f"pusher@actuation@{name}"), None]
@@ -92,8 +92,10 @@ class AirHockey:
         )
         speed = inputs[:, 3, None]
         time = self._model.opt.timestep * np.arange(steps)
-        end = ramp + stroke / speed
-        share = np.clip(np.minimum(time / ramp, 1 - (time - end) / settle), 0, 1)
+        out = ramp + stroke / speed
+        back = out + settle + stroke / speed
+        forth = np.clip(np.minimum(time / ramp, 1 - 2 * (time - out) / settle), -1, 1)
+        share = np.where(time < out + settle, forth, -np.clip(1 - (time - back) / ramp, 0, 1))
         heading = np.arctan2(self._rest[1] - inputs[:, 1], self._rest[0] - inputs[:, 0]) + inputs[:, 2]
         direction = np.stack([np.cos(heading), np.sin(heading)], axis=1)
         return np.asarray((discount * speed * share)[:, :, None] * direction[:, None, :])

@@ -1,0 +1,205 @@
+"""Maximum a posteriori by Levenberg-Marquardt, with finite differences taken in one batch of rollouts.
+
+Source: Nocedal and Wright 2006, chapter 10; robust weights after Huber in the smooth form of Charbonnier,
+rho(r) = 2 c^2 (sqrt(1 + r^2 / c^2) - 1), by iteratively reweighted least squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.types import Bools, Floats, Ints
+
+_TRIALS = np.array([0.01, 1.0, 100.0])
+"""Damping factors tried at once, relative to the current one."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where a fit stands."""
+
+    values: Floats
+    """(P,) parameters."""
+    launch: Floats
+    """(E, A) offsets of the inputs."""
+    cost: float
+    """Half the robust sum of squares plus half the prior's; infinite before it was evaluated."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """The model linearised at a point. n = free parameters + launches."""
+
+    residual: Floats
+    """(E, F, C) in sigma."""
+    jacobian: Floats
+    """(E, F, C, p) change of the residual per prior standard deviation of each free parameter."""
+    launch_jacobian: Floats
+    """(E, F, C, l) change of the episode's own residual per standard deviation of its launch."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Result of `minimise`."""
+
+    point: Point
+    linear: Linear
+    free: Ints
+    """(p,) indices of the free parameters."""
+    robust: float
+    """Scale c of the robust loss [sigma]."""
+    iterations: int
+    converged: bool
+    """The cost stopped falling; False: the iterations ran out."""
+
+
+def start(likelihood: Likelihood, values: Floats) -> Point:
+    """A point at the commanded launches."""
+    return Point(values, np.zeros_like(likelihood.inputs), np.inf)
+
+
+def cost(likelihood: Likelihood, points: list[Point], robust: float) -> Floats:
+    """(N,) cost of each point, all rolled out in one batch."""
+    episodes = len(likelihood.inputs)
+    values = np.repeat(np.stack([p.values for p in points]), episodes, axis=0)
+    inputs = np.concatenate([likelihood.inputs + p.launch for p in points])
+    residual = likelihood.residual(values, inputs, np.tile(np.arange(episodes), len(points)))
+    of_point = _rho(residual, robust).reshape(len(points), -1).sum(axis=1)
+    return np.array([0.5 * c + _prior(likelihood, p) for c, p in zip(of_point, points, strict=True)])
+
+
+def _rho(residual: Floats, robust: float) -> Floats:
+    return np.asarray(2 * robust**2 * (np.sqrt(1 + (residual / robust) ** 2) - 1))
+
+
+def _prior(likelihood: Likelihood, point: Point) -> float:
+    scaled = (point.values - likelihood.prior_mean) / likelihood.prior_std
+    random = likelihood.launch_std > 0
+    launch = point.launch[:, random] / likelihood.launch_std[random]
+    return 0.5 * float(np.sum(scaled**2) + np.sum(launch**2))
+
+
+def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats) -> Linear:
+    """Residual and one-sided differences at a point; (p,) steps in standard deviations of the prior.
+
+    A step that would leave the bounds is taken to the other side.
+    """
+    episodes = len(likelihood.inputs)
+    random = np.flatnonzero(likelihood.launch_std > 0)
+    steps = steps * likelihood.prior_std[free]
+    steps = np.where(point.values[free] + steps > likelihood.high[free], -steps, steps)
+    columns = 1 + len(free) + len(random)
+    values = np.tile(point.values, (columns, episodes, 1))
+    inputs = np.tile(likelihood.inputs + point.launch, (columns, 1, 1))
+    for i, parameter in enumerate(free):
+        values[1 + i, :, parameter] += steps[i]
+    for i, column in enumerate(random):
+        inputs[1 + len(free) + i, :, column] += 0.1 * likelihood.launch_std[column]
+    index = np.tile(np.arange(episodes), columns)
+    flat = likelihood.residual(values.reshape(-1, values.shape[2]), inputs.reshape(-1, inputs.shape[2]), index)
+    residual = flat.reshape(columns, episodes, *flat.shape[1:])
+    scale = likelihood.prior_std[free] / steps
+    jacobian = np.moveaxis((residual[1 : 1 + len(free)] - residual[0]) * scale[:, None, None, None], 0, -1)
+    launch = np.moveaxis((residual[1 + len(free) :] - residual[0]) * 10.0, 0, -1)
+    return Linear(residual[0], jacobian, launch)
+
+
+def difference_steps(linear: Linear) -> Floats:
+    """(p,) steps that move the residual by half a sigma rms: well above the simulator's roughness, below its curvature."""
+    effect = np.sqrt(np.mean(linear.jacobian**2, axis=(0, 1, 2)))
+    return np.asarray(np.clip(0.5 / np.maximum(effect, 1e-12), 1e-3, 1.0))
+
+
+def normal_equations(
+    likelihood: Likelihood, point: Point, linear: Linear, free: Ints, robust: float
+) -> tuple[Floats, Floats]:
+    """(n, n) Gauss-Newton Hessian and (n,) gradient in units of the prior's standard deviations, prior included."""
+    weight = 1 / np.sqrt(1 + (linear.residual / robust) ** 2)
+    episodes, p, launches = len(likelihood.inputs), len(free), linear.launch_jacobian.shape[-1]
+    n = p + episodes * launches
+    hessian, gradient = np.eye(n), np.zeros(n)
+    j = linear.jacobian.reshape(episodes, -1, p)
+    jl = linear.launch_jacobian.reshape(episodes, j.shape[1], launches)
+    w, r = weight.reshape(episodes, -1), linear.residual.reshape(episodes, -1)
+    for e in range(episodes):
+        own = slice(p + e * launches, p + (e + 1) * launches)
+        weighted = j[e] * w[e][:, None]
+        hessian[:p, :p] += weighted.T @ j[e]
+        hessian[:p, own] += weighted.T @ jl[e]
+        hessian[own, :p] += jl[e].T @ weighted
+        hessian[own, own] += (jl[e] * w[e][:, None]).T @ jl[e]
+        gradient[:p] += weighted.T @ r[e]
+        gradient[own] += (jl[e] * w[e][:, None]).T @ r[e]
+    random = likelihood.launch_std > 0
+    gradient[:p] += (point.values[free] - likelihood.prior_mean[free]) / likelihood.prior_std[free]
+    gradient[p:] += (point.launch[:, random] / likelihood.launch_std[random]).ravel()
+    return hessian, gradient
+
+
+def minimise(
+    likelihood: Likelihood,
+    point: Point,
+    free: Ints,
+    iterations: int,
+    robust: float = 4.0,
+    tolerance: float = 1e-3,
+    keep_going: Callable[[Point], bool] = lambda point: True,
+) -> Fit:
+    """Levenberg-Marquardt from a point until the cost falls by less than `tolerance` (absolute, in log likelihood)."""
+    damping = 1e-3
+    steps = np.ones(len(free))
+    point = replace(point, cost=float(cost(likelihood, [point], robust)[0]))
+    for iteration in range(iterations):
+        linear = linearise(likelihood, point, free, steps)
+        steps = difference_steps(linear)
+        hessian, gradient = normal_equations(likelihood, point, linear, free, robust)
+        better = None
+        for _ in range(3):
+            trials = [_step(likelihood, point, free, hessian, gradient, damping * factor) for factor in _TRIALS]
+            costs = cost(likelihood, trials, robust)
+            best = int(np.argmin(costs))
+            if costs[best] < point.cost:
+                damping = max(damping * _TRIALS[best], 1e-9)
+                better = replace(trials[best], cost=float(costs[best]))
+                break
+            damping *= 1e4
+        if better is None or point.cost - better.cost < tolerance:
+            return Fit(better or point, linear, free, robust, iteration + 1, converged=True)
+        point = better
+        if not keep_going(point):
+            return Fit(point, linear, free, robust, iteration + 1, converged=False)
+    return Fit(point, linear, free, robust, iterations, converged=False)
+
+
+def _step(
+    likelihood: Likelihood, point: Point, free: Ints, hessian: Floats, gradient: Floats, damping: float
+) -> Point:
+    """A damped step, kept inside the bounds: what would leave them stays on them and the rest is solved again."""
+    p = len(free)
+    scale = likelihood.prior_std[free]
+    low = (likelihood.low[free] - point.values[free]) / scale
+    high = (likelihood.high[free] - point.values[free]) / scale
+    move = np.zeros(len(gradient))
+    held: Bools = np.zeros(len(gradient), bool)
+    damped = hessian + damping * np.diag(np.diag(hessian))
+    for _ in range(4):
+        loose = ~held
+        move[loose] = -np.linalg.solve(
+            damped[np.ix_(loose, loose)], gradient[loose] + damped[np.ix_(loose, held)] @ move[held]
+        )
+        outside = np.flatnonzero((move[:p] < low) | (move[:p] > high))
+        if not len(outside):
+            break
+        move[outside] = np.clip(move[outside], low[outside], high[outside])
+        held[outside] = True
+    move[:p] = np.clip(move[:p], low, high)
+    values = point.values.copy()
+    values[free] += scale * move[:p]
+    launch = point.launch.copy()
+    random = likelihood.launch_std > 0
+    launch[:, random] += move[p:].reshape(len(launch), -1) * likelihood.launch_std[random]
+    return Point(values, launch, np.inf)

@@ -1,0 +1,76 @@
+"""What was recorded, how well, and what was known before: the function that a fit maximises.
+
+The residual is (predicted - measured) / sigma. Unknown are the parameters, which all episodes share, and the launch of
+each episode (its true speed and angle differ a little from the command): small Gaussian offsets of the inputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compass_ros.types import Floats, Ints, Parameter
+
+Predict = Callable[[Floats, Floats, Floats], Floats]
+"""(B, P) values, (B, A) inputs, (B, F) times [s] -> (B, F, C) what the tracker would say. The only door to a simulator."""
+
+
+@dataclass(frozen=True)
+class Likelihood:
+    """E episodes, F frames, C observed columns, P parameters, A inputs."""
+
+    predict: Predict
+    parameters: tuple[Parameter, ...]
+    inputs: Floats
+    """(E, A) commanded."""
+    time_s: Floats
+    """(E, F) since the command."""
+    measured: Floats
+    """(E, F, C), NaN where not seen."""
+    sigma: Floats
+    """(E, F, C) standard deviation of one measurement, the simulator's own roughness included."""
+    correlation_time: float
+    """Frames that one independent measurement is worth (1 = white noise)."""
+    launch_std: Floats
+    """(A,) standard deviation of the launch around the command; 0 = exact."""
+    prior_mean: Floats
+    """(P,)"""
+    prior_std: Floats
+    """(P,)"""
+
+    @property
+    def low(self) -> Floats:
+        return np.array([p.low for p in self.parameters])
+
+    @property
+    def high(self) -> Floats:
+        return np.array([p.high for p in self.parameters])
+
+    @property
+    def measurements(self) -> int:
+        """Numbers that were measured."""
+        return int(np.sum(~np.isnan(self.measured)))
+
+    def until(self, seconds: float) -> Likelihood:
+        """The same for the first seconds after the command."""
+        frames = int(np.max(np.sum(self.time_s <= seconds, axis=1)))
+        frames = max(frames, 2)
+        measured = np.where(self.time_s[:, :frames, None] <= seconds, self.measured[:, :frames], np.nan)
+        return replace(self, time_s=self.time_s[:, :frames], measured=measured, sigma=self.sigma[:, :frames])
+
+    def of(self, episodes: Ints) -> Likelihood:
+        """The same for some of the episodes."""
+        return replace(
+            self,
+            inputs=self.inputs[episodes],
+            time_s=self.time_s[episodes],
+            measured=self.measured[episodes],
+            sigma=self.sigma[episodes],
+        )
+
+    def residual(self, values: Floats, inputs: Floats, episode: Ints) -> Floats:
+        """(B, F, C) residuals in sigma for (B, P) values and (B, A) inputs; 0 where nothing was measured."""
+        predicted = self.predict(values, inputs, self.time_s[episode])
+        return np.asarray(np.nan_to_num((predicted - self.measured[episode]) / self.sigma[episode]))

@@ -1,0 +1,140 @@
+"""Exact values of the parameters that matter: the simulator in the loop, on a horizon that grows.
+
+A whole trajectory through several collisions has many minima; its first tenth has one. So the fit starts with the first
+tenth of each episode and follows the solution as more is added. It starts with the parameters that move the trajectories
+most, and frees the others, down to those that the recordings can just feel, when the whole episode fits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compass_ros.calibration.least_squares import (
+    Fit,
+    Point,
+    difference_steps,
+    linearise,
+    minimise,
+    normal_equations,
+    start,
+)
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.types import Floats, Ints
+
+HORIZONS = (0.16, 0.28, 0.4, 0.55, 0.75, 1.0)
+"""Shares of the episode, in turn."""
+FELT = 2.0
+"""A parameter is free where half a prior width of it moves all recordings together by more than this many sigma."""
+STRONG = 60.0
+"""The same for the first stage, in which the horizon grows."""
+ROBUST = 4.0
+"""Scale of the loss [sigma]: Gaussian noise is hardly touched, a swapped or lost frame hardly counts."""
+
+Watch = Callable[[str, float, Point], bool]
+"""(stage, share of the refinement done, where it stands) -> whether to go on."""
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A maximum a posteriori with its local shape."""
+
+    fit: Fit
+    likelihood: Likelihood
+    """The one that was maximised at last: its sigma holds the simulator's roughness."""
+    covariance: Floats
+    """(n, n) of free parameters, then launches, in units of the prior's standard deviations."""
+    chi_square: float
+    """Mean squared residual over what noise alone would leave; 1 = the noise floor."""
+    strength: Floats
+    """(P,) sigma by which one prior width of each parameter moves all recordings together, at the start."""
+
+
+def refine(likelihood: Likelihood, values: Floats, watch: Watch = lambda *_: True) -> Refined:
+    """Fit from the given (P,) values."""
+    strength = sensitivity(likelihood, values)
+    point = start(likelihood, values)
+    strong = np.flatnonzero(strength > STRONG)
+    for i, share in enumerate(HORIZONS):
+        part = likelihood.until(share * float(likelihood.time_s.max()))
+        robust = max(ROBUST, 3.0 * typical_residual(part, point))
+        last = share == HORIZONS[-1]
+        point = minimise(part, point, strong, 8 if last else 4, robust, tolerance=1.0 if last else 5.0).point
+        if not watch("refine", 0.7 * (i + 1) / len(HORIZONS), point):
+            break
+    return polish(likelihood, point, strength, watch)
+
+
+def polish(likelihood: Likelihood, point: Point, strength: Floats, watch: Watch = lambda *_: True) -> Refined:
+    """Free everything that is felt, learn the simulator's roughness there, and fit once more."""
+    felt = np.flatnonzero(strength > FELT)
+    fit = minimise(likelihood, point, felt, 6, max(ROBUST, 3.0 * typical_residual(likelihood, point)), tolerance=1.0)
+    watch("refine", 0.85, fit.point)
+    rough = with_roughness(likelihood, fit)
+    fit = minimise(rough, fit.point, felt, 6, ROBUST, tolerance=0.1)
+    watch("refine", 1.0, fit.point)
+    hessian, _ = normal_equations(rough, fit.point, fit.linear, felt, ROBUST)
+    covariance = np.linalg.inv(hessian) * rough.correlation_time
+    return Refined(fit, rough, covariance, chi_square(rough, fit), strength)
+
+
+def sensitivity(likelihood: Likelihood, values: Floats) -> Floats:
+    """(P,) sigma by which one prior width of each parameter moves all recordings together."""
+    everything = np.arange(len(likelihood.parameters))
+    point = start(likelihood, values)
+    coarse = linearise(likelihood, point, everything, np.full(len(everything), 0.5))
+    return np.asarray(np.sqrt(np.sum(coarse.jacobian**2, axis=(0, 1, 2))))
+
+
+def typical_residual(likelihood: Likelihood, point: Point) -> float:
+    """Median size of a residual [sigma], scaled to a standard deviation."""
+    residual = residual_at(likelihood, point)
+    return float(np.median(np.abs(residual[~np.isnan(likelihood.measured)]))) / 0.6745
+
+
+def residual_at(likelihood: Likelihood, point: Point) -> Floats:
+    """(E, F, C) residuals at a point."""
+    episodes = np.arange(len(likelihood.inputs))
+    return likelihood.residual(
+        np.tile(point.values, (len(episodes), 1)), likelihood.inputs + point.launch, episodes
+    )
+
+
+def chi_square(likelihood: Likelihood, fit: Fit) -> float:
+    """Mean squared residual, outliers clipped as the loss does, over the degrees of freedom that remain."""
+    measured = ~np.isnan(likelihood.measured)
+    squared = np.minimum(residual_at(likelihood, fit.point)[measured] ** 2, fit.robust**2)
+    return float(np.sum(squared) / max(len(squared) - len(fit.free), 1))
+
+
+def with_roughness(likelihood: Likelihood, fit: Fit, draws: int = 6) -> Likelihood:
+    """Add the simulator's roughness around a fit to sigma.
+
+    Small random changes of the free parameters must move the trajectories as the linear model says. What they do beyond
+    that, through steps at contacts and amplification by later collisions, is nothing that a fit could follow: noise.
+    """
+    rng = np.random.default_rng(0)
+    free, episodes = fit.free, len(likelihood.inputs)
+    steps = difference_steps(fit.linear)
+    moves = rng.choice([-1.0, 1.0], (draws, len(free))) * steps / np.sqrt(len(free))
+    values = np.tile(fit.point.values, (draws, 1))
+    values[:, free] += moves * likelihood.prior_std[free]
+    values = np.clip(values, likelihood.low, likelihood.high)
+    moves = (values - fit.point.values)[:, free] / likelihood.prior_std[free]
+    index = np.tile(np.arange(episodes), draws)
+    inputs = np.tile(likelihood.inputs + fit.point.launch, (draws, 1))
+    there = likelihood.residual(np.repeat(values, episodes, axis=0), inputs, index)
+    beyond = there.reshape(draws, *fit.linear.residual.shape) - fit.linear.residual
+    beyond -= np.einsum("efcp,np->nefc", fit.linear.jacobian, moves)
+    spread = np.sqrt(np.mean(beyond**2, axis=0)) * likelihood.sigma
+    grown = np.maximum.accumulate(spread, axis=1)  # roughness never heals
+    return replace(likelihood, sigma=np.hypot(likelihood.sigma, grown))
+
+
+def standard_errors(refined: Refined) -> tuple[Ints, Floats]:
+    """Free parameters and one standard deviation of each, in their units."""
+    free = refined.fit.free
+    variance = np.diag(refined.covariance)[: len(free)]
+    return free, np.sqrt(variance) * refined.likelihood.prior_std[free]
