@@ -39,9 +39,12 @@ class RawMessage:
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path looks like a bag, whole or not: a .mcap, .db3 or .bag file, or a folder that holds one."""
+    """Whether a path looks like a bag, whole or not: a .mcap, .db3 or .bag file, or a rosbag2 folder.
+
+    A folder without metadata.yaml counts where a file in it is named after it, as the files of a cut-off bag are.
+    """
     if path.is_dir():
-        return (path / metadata.FILE_NAME).exists() or any(_storage_files(path))
+        return (path / metadata.FILE_NAME).exists() or bool(_storage_files(path))
     return path.suffix in _READERS
 
 
@@ -84,12 +87,14 @@ def known_digest(topic: RawTopic) -> str:
 
 
 def _storage_files(folder: Path) -> list[Path]:
-    return sorted(file for file in folder.iterdir() if file.suffix in _READERS and file.is_file())
+    return sorted(
+        file for file in folder.glob("*") if file.suffix in (".mcap", ".db3") and file.stem.startswith(folder.name)
+    )
 
 
 def _scan_folder(folder: Path) -> Iterator[RawTopic | RawMessage]:
     if not (folder / metadata.FILE_NAME).exists():
-        if any(_storage_files(folder)):
+        if _storage_files(folder):
             raise BagError(f"{folder}: truncated, it has no metadata.yaml; run: compass record --recover {folder}")
         raise BagError(f"{folder}: expected a bag, found a folder without metadata.yaml and without messages")
     summary = metadata.read_summary(folder)
