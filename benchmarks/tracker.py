@@ -11,13 +11,12 @@ import argparse
 import time
 from collections.abc import Iterator
 
-import cv2
 import numpy as np
 
 from compass_ros.tracking.config import TrackerConfig
 from compass_ros.tracking.rehearsal import Shot, film, random_shot
 from compass_ros.tracking.scene_config import SceneConfig
-from compass_ros.tracking.tracker import Frame, TrackerState, step
+from compass_ros.tracking.tracker import Frame, TrackerState, step, use_one_core
 from compass_ros.tracking.virtual_camera import make_camera
 
 _DURATION_S = 2.5
@@ -47,7 +46,7 @@ def main() -> None:
     parser.add_argument("--shots", type=int, default=20)
     parser.add_argument("--simulator", action="store_true")
     arguments = parser.parse_args()
-    cv2.setNumThreads(1)
+    use_one_core()
     scene = SceneConfig()
     camera = make_camera(scene)
     config = TrackerConfig()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import cv2
@@ -27,10 +28,22 @@ class CameraModel:
 
     width: int
     height: int
-    matrix: Floats
-    """(3, 3) [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels."""
-    distortion: Floats
-    """(0,), (4,), (5,) or (8,) coefficients in OpenCV's order."""
+    focal: tuple[float, float]
+    """fx, fy [px]."""
+    centre: tuple[float, float]
+    """cx, cy [px]."""
+    coefficients: tuple[float, ...] = ()
+    """0, 4, 5 or 8 of the distortion, in OpenCV's order."""
+
+    @cached_property
+    def matrix(self) -> Floats:
+        """(3, 3) [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels."""
+        return np.array([[self.focal[0], 0, self.centre[0]], [0, self.focal[1], self.centre[1]], [0, 0, 1]])
+
+    @cached_property
+    def distortion(self) -> Floats:
+        """(D,) the coefficients."""
+        return np.array(self.coefficients)
 
     def pixel_from_normalised(self, points: Floats) -> Floats:
         """Ideal image coordinates x/z, y/z (..., 2) -> distorted pixels (..., 2)."""
@@ -113,7 +126,7 @@ def camera_model(
     width, height = size
     if width <= 0 or height <= 0:
         raise TrackingError(f"{where}: image size must be positive, found {width}x{height}")
-    return CameraModel(width, height, k.reshape(3, 3), d)
+    return CameraModel(width, height, (float(k[0]), float(k[4])), (float(k[2]), float(k[5])), tuple(d.tolist()))
 
 
 def read_camera(path: Path) -> CameraModel:

@@ -106,8 +106,8 @@ def scene_config(content: Mapping[str, object], where: str = "virtual camera") -
 
 def camera_of(config: CameraConfig) -> CameraModel:
     """The camera's true intrinsics."""
-    matrix = np.array([[config.fx, 0, config.cx], [0, config.fy, config.cy], [0, 0, 1]])
-    return CameraModel(config.width, config.height, matrix, np.asarray(config.distortion))
+    focal, centre = (config.fx, config.fy), (config.cx, config.cy)
+    return CameraModel(config.width, config.height, focal, centre, config.distortion)
 
 
 def view_of(config: CameraConfig) -> TableView:

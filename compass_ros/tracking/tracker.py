@@ -71,6 +71,12 @@ class TrackerState:
     images: int = 0
 
 
+def use_one_core() -> None:
+    """Keep OpenCV to the calling thread: on images this small its threads cost more than they bring, and on a busy
+    machine they wait for each other."""
+    cv2.setNumThreads(1)
+
+
 def step(
     state: TrackerState, image: NDArray[np.uint8], stamp_ns: int, camera: CameraModel, config: TrackerConfig
 ) -> tuple[TrackerState, Frame]:

@@ -47,11 +47,10 @@ def exposure_times(camera: CameraConfig, mid_s: Floats) -> Floats:
     return np.asarray(mid_s[:, None] + camera.exposure_s * share)
 
 
-def render(camera: VirtualCamera, poses: Mapping[str, Floats], image_number: int) -> NDArray[np.uint8]:
-    """One BGR image (H, W, 3).
+def draw(camera: VirtualCamera, poses: Mapping[str, Floats]) -> NDArray[np.uint8]:
+    """What falls on the sensor: a BGR image (H, W, 3) without noise.
 
     `poses`: name of a disc -> (sub_frames, 3) x, y [m], yaw [rad] in the frame `table` at the moments of the exposure.
-    `image_number` picks the noise: the same number gives the same image.
     """
     config, scene = camera.config, camera.scene
     image = scene.background.copy()
@@ -61,12 +60,22 @@ def render(camera: VirtualCamera, poses: Mapping[str, Floats], image_number: int
     if config.arm is not None and config.arm.holds in poses:
         hand = poses[config.arm.holds][:, :2].mean(axis=0)
         draw_arm(image, scene.view, config.arm, arm_pose(config.arm, hand))
-    if config.camera.noise == 0:
-        return image
-    # two primes walk through all windows before one comes again
+    return image
+
+
+def expose(camera: VirtualCamera, drawn: NDArray[np.uint8], image_number: int) -> NDArray[np.uint8]:
+    """The image that the sensor reads: with noise, which the number picks."""
+    if camera.config.camera.noise == 0:
+        return drawn
+    # two strides without a common divisor walk through all windows before one comes again
     row, column = image_number * 29 % _NOISE_MARGIN, image_number * 37 % (_NOISE_MARGIN - 1)
-    window = camera.noise[row : row + image.shape[0], column : column + image.shape[1]]
-    return np.asarray(cv2.add(image, window, dtype=cv2.CV_8U), dtype=np.uint8)
+    window = camera.noise[row : row + drawn.shape[0], column : column + drawn.shape[1]]
+    return np.asarray(cv2.add(drawn, window, dtype=cv2.CV_8U), dtype=np.uint8)
+
+
+def render(camera: VirtualCamera, poses: Mapping[str, Floats], image_number: int) -> NDArray[np.uint8]:
+    """One image: `draw`, then `expose`. The same poses and number give the same image."""
+    return expose(camera, draw(camera, poses), image_number)
 
 
 def _draw_disc(image: NDArray[np.uint8], scene: Scene, disc: DiscConfig, pose: Floats) -> None:

@@ -1,0 +1,129 @@
+"""Images, camera_info and sightings as messages, and back."""
+
+from __future__ import annotations
+
+import array
+import math
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from builtin_interfaces.msg import Duration, Time
+from geometry_msgs.msg import Point, Pose, PoseWithCovarianceStamped, Quaternion, Vector3
+from numpy.typing import NDArray
+from sensor_msgs.msg import CameraInfo, Image, JointState
+from std_msgs.msg import ColorRGBA, Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+from compass_ros.errors import TrackingError
+from compass_ros.tracking.camera import CameraModel, camera_model
+from compass_ros.tracking.config import TrackerConfig
+from compass_ros.tracking.tracker import Sighting
+from compass_ros.types import Floats
+
+FRAME = "table"
+_SECOND_NS = 1_000_000_000
+_CHANNELS = {"bgr8": (0, 1, 2), "rgb8": (2, 1, 0), "bgra8": (0, 1, 2), "rgba8": (2, 1, 0)}
+_DEPTH = {"bgr8": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4}
+_UNKNOWN_YAW_VARIANCE = math.pi**2 / 3
+"""A round object shows no yaw: uniform over the circle [rad^2]."""
+
+
+def stamp_message(stamp_ns: int) -> Time:
+    return Time(sec=stamp_ns // _SECOND_NS, nanosec=stamp_ns % _SECOND_NS)
+
+
+def stamp_ns(stamp: Time) -> int:
+    return int(stamp.sec * _SECOND_NS + stamp.nanosec)
+
+
+def header(at_ns: int, frame: str) -> Header:
+    return Header(stamp=stamp_message(at_ns), frame_id=frame)
+
+
+def image_from_message(message: Image) -> NDArray[np.uint8]:
+    """The image as BGR (H, W, 3). Raises TrackingError for an encoding without colour, or a message cut short."""
+    order = _CHANNELS.get(message.encoding)
+    if order is None:
+        raise TrackingError(f"image encoding '{message.encoding}': expected a colour image, one of {sorted(_CHANNELS)}")
+    depth = _DEPTH[message.encoding]
+    data = np.frombuffer(message.data, dtype=np.uint8)
+    if data.size != message.height * message.step or message.step < message.width * depth:
+        raise TrackingError(
+            f"image is cut short: {data.size} bytes for {message.height} rows of {message.step} bytes, "
+            f"{message.width} pixels each"
+        )
+    rows = data.reshape(message.height, message.step)[:, : message.width * depth]
+    pixels = rows.reshape(message.height, message.width, depth)
+    return np.ascontiguousarray(pixels if order == (0, 1, 2) and depth == 3 else pixels[..., order])
+
+
+def image_message(bgr: NDArray[np.uint8], head: Header) -> Image:
+    height, width = bgr.shape[:2]
+    message = Image(header=head, height=height, width=width, encoding="bgr8", step=3 * width)
+    message.data = array.array("B", bgr.tobytes())
+    return message
+
+
+def camera_from_message(message: CameraInfo) -> CameraModel:
+    """Raises TrackingError for a camera that is not calibrated or whose distortion is not known."""
+    size = (message.width, message.height)
+    return camera_model(size, list(message.k), message.distortion_model, list(message.d), "camera_info")
+
+
+def camera_info_message(camera: CameraModel, head: Header) -> CameraInfo:
+    k = camera.matrix
+    projection = np.hstack([k, np.zeros((3, 1))])
+    return CameraInfo(
+        header=head, width=camera.width, height=camera.height, distortion_model="plumb_bob",
+        d=camera.distortion.tolist(), k=k.ravel().tolist(), r=np.eye(3).ravel().tolist(), p=projection.ravel().tolist(),
+    )  # fmt: skip
+
+
+def pose_message(sighting: Sighting) -> PoseWithCovarianceStamped:
+    """Position on the table's surface; the orientation is the identity, with a yaw that is stated as not known."""
+    message = PoseWithCovarianceStamped(header=header(sighting.stamp_ns, FRAME))
+    x, y = sighting.xy.tolist()
+    message.pose.pose = Pose(position=Point(x=x, y=y), orientation=Quaternion(w=1.0))
+    covariance = np.zeros((6, 6))
+    covariance[:2, :2] = sighting.covariance
+    covariance[5, 5] = _UNKNOWN_YAW_VARIANCE
+    message.pose.covariance = covariance.ravel().tolist()
+    return message
+
+
+def markers_message(sightings: Iterable[Sighting], config: TrackerConfig, at_ns: int) -> MarkerArray:
+    """Discs in their colours, pale where predicted; each vanishes when it is not renewed."""
+    markers = []
+    for number, sighting in enumerate(sightings):
+        look = config.objects[sighting.object]
+        x, y = sighting.xy.tolist()
+        markers.append(
+            Marker(
+                header=header(at_ns, FRAME),
+                ns=sighting.object,
+                id=number,
+                type=Marker.CYLINDER,
+                action=Marker.ADD,
+                pose=Pose(position=Point(x=x, y=y, z=look.height_m / 2), orientation=Quaternion(w=1.0)),
+                scale=Vector3(x=2 * look.radius_m, y=2 * look.radius_m, z=look.height_m),
+                color=_colour(look.hue_deg, 1.0 if sighting.seen else 0.35),
+                lifetime=Duration(nanosec=300_000_000),
+            )
+        )
+    return MarkerArray(markers=markers)
+
+
+def joint_message(joints: Mapping[str, float], head: Header) -> JointState:
+    return JointState(header=head, name=list(joints), position=[float(angle) for angle in joints.values()])
+
+
+def covariance_of(message: PoseWithCovarianceStamped) -> Floats:
+    """(2, 2) of x and y [m^2]."""
+    return np.asarray(message.pose.covariance).reshape(6, 6)[:2, :2]
+
+
+def _colour(hue_deg: float, alpha: float) -> ColorRGBA:
+    red, green, blue = (
+        min(max(abs((hue_deg / 60 + shift) % 6 - 3) - 1, 0.0), 1.0) * 0.9 + 0.05 for shift in (0.0, 4.0, 2.0)
+    )
+    return ColorRGBA(r=red, g=green, b=blue, a=alpha)

@@ -1,0 +1,109 @@
+"""What the virtual cell plays: its hidden parameters and, for a shot, where everything is in every image."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from compass_ros.cells import Cell
+from compass_ros.config import read_yaml
+from compass_ros.errors import ConfigError, nearest
+from compass_ros.simulation import Simulator
+from compass_ros.tracking.scene_config import SceneConfig
+from compass_ros.tracking.virtual_camera import exposure_times
+from compass_ros.types import Floats
+
+STILL_S = 0.5
+"""Still images before and after the motion."""
+
+
+@dataclass(frozen=True)
+class Play:
+    """One shot, image by image."""
+
+    moments: Mapping[str, Floats]
+    """Name -> (F, sub_frames, 3) x, y [m], yaw [rad] at the moments of the exposures."""
+    begin: int
+    """Image in the middle of whose exposure the motion begins."""
+
+    @property
+    def length(self) -> int:
+        """Images."""
+        return len(next(iter(self.moments.values())))
+
+    def poses(self, image: int) -> dict[str, Floats]:
+        """Name -> (sub_frames, 3); after the last image everything stays where it is."""
+        index = min(image, self.length - 1)
+        return {name: pose[index] for name, pose in self.moments.items()}
+
+    def still(self, image: int) -> bool:
+        """Whether nothing has moved since the image before."""
+        if image == 0:
+            return False
+        now, before = self.poses(image), self.poses(image - 1)
+        return all(np.array_equal(now[name], before[name]) for name in now)
+
+
+def hidden_values(cell: Cell, file: str, seed: int) -> Floats:
+    """(P,) the true parameters. `file`: YAML of name: value, the others keep their defaults; empty: drawn with `seed`,
+    uniform within each parameter's half-width of randomisation around its default. Raises ConfigError."""
+    if not file:
+        rng = np.random.default_rng(seed)
+        drawn = [rng.uniform(p.default - p.half_width, p.default + p.half_width) for p in cell.parameters]
+        return np.clip(drawn, [p.low for p in cell.parameters], [p.high for p in cell.parameters])
+    values = {p.name: p.default for p in cell.parameters}
+    bounds = {p.name: (p.low, p.high) for p in cell.parameters}
+    for name, value in read_yaml(Path(file)).items():
+        if name not in values:
+            raise ConfigError(f"{file}: cell '{cell.name}' has no parameter '{name}'{nearest(str(name), values)}")
+        low, high = bounds[name]
+        if not isinstance(value, (int, float)) or not low <= value <= high:
+            raise ConfigError(f"{file}: {name}: expected a number from {low} to {high}, found {value!r}")
+        values[name] = float(value)
+    return np.array(list(values.values()))
+
+
+def table_shift(cell: Cell, values: Floats) -> tuple[float, float]:
+    """How far the table stands from where the fiducials say [m]: the bias of all tracked positions."""
+    by_name = {p.name: float(value) for p, value in zip(cell.parameters, values, strict=True)}
+    return by_name.get("env@camera@bias_x", 0.0), by_name.get("env@camera@bias_y", 0.0)
+
+
+def action_of(cell: Cell, names: Sequence[str], values: Sequence[float]) -> Floats:
+    """(A,) the commanded action in the cell's order. Raises ConfigError for a wrong name or a value out of reach."""
+    given = dict(zip(names, values, strict=False))
+    expected = [field.name for field in cell.action]
+    if len(names) != len(values) or sorted(names) != sorted(expected):
+        raise ConfigError(f"shot command: expected values of {expected}, found {len(values)} values of {list(names)}")
+    action = np.array([given[name] for name in expected])
+    for name, value, (low, high) in zip(expected, action, cell.reach, strict=True):
+        if not low - 1e-9 <= value <= high + 1e-9:
+            raise ConfigError(f"shot command: {name}: expected {low} to {high}, found {value}")
+    return action
+
+
+def resting(simulator: Simulator, scene: SceneConfig, values: Floats) -> Play:
+    """One image of the cell before any shot. Raises ConfigError if the scene cannot show this cell."""
+    middle = np.array([(field.low + field.high) / 2 for field in simulator.cell.action])
+    bodies = simulator.bodies(values, middle, np.array([0.0, simulator.time_step]))
+    if not set(scene.discs) <= set(bodies):
+        raise ConfigError(
+            f"cell '{simulator.cell.name}' cannot be filmed: the scene shows {sorted(scene.discs)}, "
+            f"the cell moves {sorted(bodies)}"
+        )
+    frames = scene.camera.sub_frames
+    return Play({name: np.repeat(bodies[name][:1], frames, axis=0)[None] for name in scene.discs}, 0)
+
+
+def play(simulator: Simulator, scene: SceneConfig, values: Floats, action: Floats) -> Play:
+    """A shot (A,) with still images before and after it."""
+    rate = scene.camera.rate_hz
+    begin = round(STILL_S * rate)
+    count = begin + round((simulator.cell.duration + STILL_S) * rate)
+    mid_s = (np.arange(count) - begin) / rate
+    times = np.clip(exposure_times(scene.camera, mid_s), 0.0, simulator.cell.duration)
+    flat = simulator.bodies(values, action, times.ravel())
+    return Play({name: flat[name].reshape(*times.shape, 3) for name in scene.discs}, begin)

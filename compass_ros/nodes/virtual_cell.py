@@ -1,0 +1,158 @@
+"""Node `virtual_cell`: stands where a robot cell and its camera stand.
+
+It takes a shot command, plays it in a simulator of its own whose parameters nobody else knows, and publishes what a
+camera over the table and the arm's encoders would: images, camera_info and joint angles. True poses stay inside. The
+service `~/reveal` tells the true parameters, for the end of a demonstration.
+
+Image stamps are simulated sensor times (the middle of each exposure), exactly one period apart; they start at the
+clock's time and go on however long the drawing takes. The bias of the tracked positions is drawn as what it is in a
+real cell: table, walls and obstacle stand shifted against the fiducials.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+import rclpy
+from compass_interfaces.msg import ShotCommand
+from numpy.typing import NDArray
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import CameraInfo, Image, JointState
+from std_srvs.srv import Trigger
+
+from compass_ros.cells import load
+from compass_ros.errors import CompassError, ConfigError
+from compass_ros.nodes import images
+from compass_ros.nodes.play import action_of, hidden_values, play, resting, table_shift
+from compass_ros.simulation import Simulator
+from compass_ros.tracking.arm import arm_pose
+from compass_ros.tracking.scene_config import SceneConfig, scene_config
+from compass_ros.tracking.tracker import use_one_core
+from compass_ros.tracking.virtual_camera import draw, expose, make_camera
+
+CAMERA_FRAME = "virtual_camera_optical_frame"
+JOINTS = ("shoulder", "elbow")
+
+
+class VirtualCell(Node):
+    """A camera that never stops, and a shot at a time."""
+
+    def __init__(self) -> None:
+        super().__init__("virtual_cell")
+        self._declare()
+        self._cell = load(self.get_parameter("cell").value)
+        file, seed = self.get_parameter("hidden_parameters_file").value, self.get_parameter("seed").value
+        self._values = hidden_values(self._cell, file, seed)
+        self._simulator = Simulator(self._cell, threads=1)
+        self._scene = self._read_scene()
+        self._camera = make_camera(self._scene, seed, table_shift(self._cell, self._values))
+        self._play = resting(self._simulator, self._scene, self._values)
+        self._command: ShotCommand | None = None
+        self._drawn: NDArray[np.uint8] | None = None
+        self._start_ns = self.get_clock().now().nanoseconds
+        self._images_taken = 0
+        self._image_of_play = 0
+
+        self._images = self.create_publisher(Image, "image", qos_profile_sensor_data)
+        self._infos = self.create_publisher(CameraInfo, "camera_info", qos_profile_sensor_data)
+        self._joints = self.create_publisher(JointState, "~/joint_states", qos_profile_sensor_data)
+        self._shots = self.create_publisher(ShotCommand, "~/shot", 10)
+        self.create_subscription(ShotCommand, "~/command", self._on_command, 10)
+        self.create_service(Trigger, "~/reveal", self._on_reveal)
+        rate = self._scene.camera.rate_hz
+        self.create_timer(1 / (rate * self.get_parameter("real_time_factor").value), self._on_time)
+        self.get_logger().info(f"cell '{self._cell.name}' is ready, {rate} images a second")
+
+    def _declare(self) -> None:
+        def describe(text: str, **ranges: object) -> ParameterDescriptor:
+            return ParameterDescriptor(description=text, read_only=True, **ranges)
+
+        self.declare_parameter("cell", "air_hockey", describe("name of the cell to stand for, or path of its YAML"))
+        hidden = "YAML of true parameters, name: value, the others at their defaults; empty: drawn with `seed`"
+        self.declare_parameter("hidden_parameters_file", "", describe(hidden))
+        seeds = [IntegerRange(from_value=0, to_value=2**31 - 1, step=1)]
+        self.declare_parameter("seed", 0, describe("seed of the hidden parameters and the noise", integer_range=seeds))
+        factors = [FloatingPointRange(from_value=0.05, to_value=20.0)]
+        faster = "simulated seconds in one second: images come so much faster, their stamps do not change"
+        self.declare_parameter("real_time_factor", 1.0, describe(faster, floating_point_range=factors))
+        self.declare_parameter("noise", 2.5, describe("standard deviation of the sensor's noise [grey levels]"))
+        self.declare_parameter("exposure_s", 0.004, describe("exposure of an image [s]"))
+        self.declare_parameter("light", 0.30, describe("share of light that is missing in the darkest corner"))
+        self.declare_parameter("arm", True, describe("draw the arm that holds the pusher"))
+
+    def _read_scene(self) -> SceneConfig:
+        camera = {name: self.get_parameter(name).value for name in ("noise", "exposure_s")}
+        content: dict[str, object] = {"camera": camera, "light": self.get_parameter("light").value}
+        if not self.get_parameter("arm").value:
+            content["arm"] = None
+        return scene_config(content, "parameters of virtual_cell")
+
+    def _on_command(self, command: ShotCommand) -> None:
+        try:
+            if command.cell not in ("", self._cell.name):
+                raise ConfigError(f"shot command: for cell '{command.cell}', this is '{self._cell.name}'")
+            if self._command is not None:
+                raise ConfigError("shot command: refused, a shot is being played")
+            action = action_of(self._cell, command.names, command.values)
+        except CompassError as error:
+            self.get_logger().error(str(error))
+            return
+        self._play = play(self._simulator, self._scene, self._values, action)
+        self._command, self._image_of_play = command, 0
+
+    def _on_time(self) -> None:
+        """Take one image."""
+        now_ns = self._start_ns + round(self._images_taken * 1e9 / self._scene.camera.rate_hz)
+        head = images.header(now_ns, CAMERA_FRAME)
+        poses = self._play.poses(self._image_of_play)
+        if self._drawn is None or not self._play.still(self._image_of_play):
+            self._drawn = draw(self._camera, poses)
+        picture = expose(self._camera, self._drawn, self._images_taken)
+        self._images.publish(images.image_message(picture, head))
+        self._infos.publish(images.camera_info_message(self._camera.scene.view.camera, head))
+        if self._scene.arm is not None:
+            angles = arm_pose(self._scene.arm, poses[self._scene.arm.holds][:, :2].mean(axis=0)).joints
+            joints = dict(zip(JOINTS, angles.tolist(), strict=True))
+            self._joints.publish(images.joint_message(joints, images.header(now_ns, "table")))
+        self._announce(now_ns)
+        self._images_taken += 1
+        self._image_of_play += 1
+
+    def _announce(self, now_ns: int) -> None:
+        """Say when the motion begins; after the last still image the cell is free again."""
+        if self._command is None:
+            return
+        if self._image_of_play == self._play.begin:
+            shot = ShotCommand(header=images.header(now_ns, "table"), cell=self._cell.name)
+            shot.names, shot.values = self._command.names, self._command.values
+            self._shots.publish(shot)
+        if self._image_of_play >= self._play.length:
+            self._command = None
+
+    def _on_reveal(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        names = [parameter.name for parameter in self._cell.parameters]
+        truth = {"cell": self._cell.name, "parameters": dict(zip(names, self._values.tolist(), strict=True))}
+        response.success, response.message = True, json.dumps(truth)
+        return response
+
+
+def main() -> None:
+    use_one_core()
+    rclpy.init()
+    try:
+        rclpy.spin(VirtualCell())
+    except CompassError as error:
+        sys.exit(f"virtual_cell: {error}")
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+
+
+if __name__ == "__main__":
+    main()
