@@ -16,6 +16,7 @@ from matplotlib.patches import Circle, Patch, Rectangle
 
 from compass_ros.reporting.drawing import plane
 from compass_ros.reporting.extras import Scene, Shape
+from compass_ros.reporting.numbers import millimetres
 from compass_ros.reporting.palette import LIGHT
 from compass_ros.reporting.words import MODEL_LABEL, MODELS, Model, held_out_rmse
 from compass_ros.types import Floats, Graph, Replay, ReplayedTrack, Result
@@ -73,8 +74,11 @@ def trajectories(replay: Replay, scene: Scene | None = None) -> Figure:
         figure = Figure(figsize=(6.4, 3.6), layout="constrained")
         axes = figure.add_subplot()
         axes.grid(visible=False)
-        for shape in scene.shapes if scene else ():
-            axes.add_patch(_patch(shape))
+        shapes = scene.shapes if scene else ()
+        patches = [axes.add_patch(_patch(shape)) for shape in shapes]
+        table = next((patch for shape, patch in zip(shapes, patches, strict=True) if shape.role == "table"), None)
+        for patch in patches if table is not None else ():
+            patch.set_clip_path(table)
         for i, track in enumerate(replay.tracks):
             recorded = "recorded" if i == 0 else None
             axes.scatter(
@@ -88,6 +92,9 @@ def trajectories(replay: Replay, scene: Scene | None = None) -> Figure:
                     xy = path[:, [first, second]].T
                     name = MODEL_LABEL[model] if i == 0 else None
                     axes.plot(*xy, LINE[model], color=LIGHT[model], lw=1.4, label=name)
+        if table is not None:
+            box = table.get_extents().transformed(axes.transData.inverted())
+            axes.set(xlim=(box.x0 - 0.01, box.x1 + 0.01), ylim=(box.y0 - 0.01, box.y1 + 0.01))
         axes.set_aspect("equal")
         axes.set_xlabel(f"{'xyz'[first]} [m]")
         axes.set_ylabel(f"{'xyz'[second]} [m]")
@@ -134,6 +141,7 @@ def parameter_curves(result: Result, most: int = 12, truth: Mapping[str, float] 
             if row.name in known:
                 axes.axhline(known[row.name], color=LIGHT["ink"], ls=":", lw=1)
             axes.plot(rollouts, [it.values[i] for it in traced], "o-", color=LIGHT["calibrated"], ms=2.5, lw=1.3)
+        figure.supxlabel("rollouts", fontsize=8, color=LIGHT["soft"])
     return figure
 
 
@@ -151,10 +159,11 @@ def gap_bars(result: Result) -> Figure:
             axes.plot([start, error], [place, place], color=LIGHT[model], alpha=0.35, lw=3)
             axes.plot(error, place, "o", color=LIGHT[model], ms=7)
             beside: dict[str, Any] = {"textcoords": "offset points", "va": "center", "weight": "bold"}
-            axes.annotate(f"{error:.3g} mm", (error, place), (8, 0), **beside)
+            axes.annotate(f"{millimetres(error / 1e3)} mm", (error, place), (8, 0), **beside)
         if math.isfinite(floor):
             axes.axvline(floor, color=LIGHT["faint"], ls=":", lw=1.5)
         axes.set_xscale("log")
+        axes.minorticks_off()
         axes.set_yticks(range(len(models)), [MODEL_LABEL[m] for m in models])
         axes.set_ylim(len(models) - 0.5, -0.5)
         axes.margins(x=0.15)

@@ -6,6 +6,7 @@ import math
 
 MISSING = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
+NARROW = "\N{NARROW NO-BREAK SPACE}"
 
 
 def plain(value: float, digits: int = 4) -> str:
@@ -42,12 +43,12 @@ def millimetres(metres: float) -> str:
     if not math.isfinite(metres):
         return MISSING
     value = metres * 1e3
-    return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 1 else f"{value:.2f}"
+    return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}"
 
 
 def percent(share: float) -> str:
     """`0.93` as `93 %`."""
-    return f"{share * 100:.0f} %".replace("-", MINUS) if math.isfinite(share) else MISSING
+    return f"{share * 100:.0f}{NARROW}%".replace("-", MINUS) if math.isfinite(share) else MISSING
 
 
 def probability(p: float) -> str:

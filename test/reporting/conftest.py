@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -213,6 +214,7 @@ MISMATCHES: dict[Verdict, Mismatch] = {
 }  # fmt: skip
 
 
+@cache
 def synthetic_result(verdict: Verdict = "named") -> Result:
     """A whole result for one verdict; the same bits every time."""
     rng = np.random.default_rng(7)

@@ -26,7 +26,7 @@ def test_value_pm(value: float, std: float, text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("metres", "text"), [(0.183, "183"), (0.0196, "19.6"), (0.00104, "1.0"), (0.00043, "0.43"), (NAN, MISSING)]
+    ("metres", "text"), [(0.183, "183"), (0.0196, "19.6"), (0.00104, "1.04"), (0.00043, "0.43"), (NAN, MISSING)]
 )
 def test_millimetres(metres: float, text: str) -> None:
     assert millimetres(metres) == text

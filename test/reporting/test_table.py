@@ -33,7 +33,7 @@ def test_parameters_gap_and_verdict(result: Result, extras: ReportExtras) -> Non
         "pusher@actuation@vel_discount", "0.75", "0.8463 ± 0.0031", "0.85", "",
     ]  # fmt: skip
     assert line(text, "calibrated")[1:] == ["19.6", "0.11", "19.40", "19.3"]
-    assert "noise floor 1.0 mm" in text
+    assert "noise floor 1.01 mm" in text
     assert result.mismatch.sentence in " ".join(text.split())
     assert "54 further parameters" in text
     assert "held out [mm]" in text

@@ -22,7 +22,7 @@ const drawMap = (target, map) => {
 for (const [key, title] of maps) {
   const box = element("div", "", document.getElementById("maps"));
   element("h3", "", box, title);
-  element("p", "note", box, `${data.maps[key].label} [${data.maps[key].unit}]${data.region ? "; the dashed circle is where it sits" : ""}`);
+  element("p", "aside", box, `${data.maps[key].label} [${data.maps[key].unit}]${data.region ? "; the dashed circle is where it sits" : ""}`);
   const target = element("div", "plot", box);
   whenSeen(target, () => drawMap(target, data.maps[key]));
 }

@@ -29,6 +29,7 @@ def questions(result: Result) -> list[dict[str, Any]]:
     """The three questions of the suite with their short answers."""
     active = active_rows(result)
     firm = sum(row.identifiable for row in active)
+    failed = VERDICT_LEVEL[result.mismatch.verdict] == "bad"
     names = [effect.name for effect in result.mismatch.effects]
     return [
         {
@@ -39,10 +40,8 @@ def questions(result: Result) -> list[dict[str, Any]]:
         },
         {
             "question": "Which values?",
-            "answer": f"{firm} pinned down",
-            "detail": f"{len(active) - firm} active ones are not identifiable"
-            if firm < len(active)
-            else "with an error bar each",
+            "answer": "not settled" if failed else f"{firm} pinned down",
+            "detail": _about_values(len(active) - firm, failed),
             "link": "parameters",
         },
         {
@@ -52,6 +51,12 @@ def questions(result: Result) -> list[dict[str, Any]]:
             "link": "missing",
         },
     ]
+
+
+def _about_values(doubtful: int, failed: bool) -> str:
+    if failed:
+        return "these are not values to use"
+    return f"{doubtful} active ones are not identifiable" if doubtful else "with an error bar each"
 
 
 def view(result: Result, extras: ReportExtras) -> dict[str, Any]:
