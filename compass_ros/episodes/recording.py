@@ -98,8 +98,8 @@ class Recorder:
         """Begin an episode; an empty name is numbered. Raises BagError: one is running, bad name, no space, exists."""
         if self._writer is not None:
             raise BagError(f"episode {self.status.episode} is being recorded; stop or discard it first")
-        name = episode_name(name) if name else next_name(path.name for path in self.folder.iterdir())
         free = self.free_bytes()
+        name = episode_name(name) if name else next_name(path.name for path in self.folder.glob("*"))
         if free < self._min_free_bytes:
             raise BagError(f"{self.folder}: {free / 1e6:.0f} MB left; expected {self._min_free_bytes / 1e6:.0f} MB")
         writer = BagWriter(self.folder / name)

@@ -64,7 +64,7 @@ def recover(path: str | Path) -> Recovery:
 
 def unfinished(folder: Path) -> tuple[Path, ...]:
     """Bags directly in a folder that have messages and no metadata.yaml: cut off, or being recorded."""
-    return tuple(sorted(p for p in folder.iterdir() if any(p.glob("*.mcap")) and not (p / metadata.FILE_NAME).exists()))
+    return tuple(sorted(p for p in folder.glob("*") if any(p.glob("*.mcap")) and not (p / metadata.FILE_NAME).exists()))
 
 
 def _folder(path: Path) -> Path:
