@@ -26,6 +26,7 @@ Message = TypeVar("Message")
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=ReliabilityPolicy.RELIABLE)
 RELIABLE = QoSProfile(depth=100)
 SENSOR = qos_profile_sensor_data
+SHARED_MEMORY = Path("/dev/shm")
 
 
 def until(condition: Callable[[], bool], timeout_s: float, what: str) -> None:
@@ -34,6 +35,26 @@ def until(condition: Callable[[], bool], timeout_s: float, what: str) -> None:
     while not condition():
         assert time.monotonic() < deadline, f"waited {timeout_s} s for {what}"
         time.sleep(0.01)
+
+
+def held_locks(pid: int) -> list[Path]:
+    """The lock files by which a process owns segments and ports of Fast DDS; `fastdds shm clean` goes by them too.
+
+    That tool looks at all processes on the machine and can hit one that is just starting; this looks at one alone.
+    """
+    held = []
+    for descriptor in Path(f"/proc/{pid}/fd").iterdir():
+        try:
+            held.append(descriptor.readlink())
+        except FileNotFoundError:
+            continue  # closed in the meantime
+    return [path for path in held if path.parent == SHARED_MEMORY and path.name.endswith("_el")]
+
+
+def remove_shared_memory(name: str) -> None:
+    """Remove one segment or port of Fast DDS whose owner is dead."""
+    for file in (name, f"{name}_el", f"{name}_sl", f"sem.{name}_mutex"):
+        (SHARED_MEMORY / file).unlink(missing_ok=True)
 
 
 class NodeProcess:
@@ -62,10 +83,13 @@ class NodeProcess:
         return self.process.wait(timeout_s)
 
     def kill(self) -> None:
-        """End it at once, with all that it started in its group."""
+        """End it at once, with all that it started in its group, and remove the shared memory that was its own."""
         if self.process.poll() is None:
+            locks = held_locks(self.process.pid)
             os.killpg(self.process.pid, signal.SIGKILL)
             self.process.wait(5)
+            for lock in locks:
+                remove_shared_memory(lock.name.removesuffix("_el"))
 
 
 class Probe:
@@ -106,7 +130,7 @@ class Probe:
         self, heard: list[Message], where: Callable[[Message], bool] = lambda _: True, timeout_s: float = 10
     ) -> Message:
         """The first message in a list of `listen` that fulfils `where`, now or later."""
-        until(lambda: any(where(message) for message in heard), timeout_s, f"a message; heard {len(heard)}")
+        until(lambda: any(where(message) for message in heard), timeout_s, f"a message; heard {heard[-3:]}")
         return next(message for message in heard if where(message))
 
     def publisher(self, kind: type[Message], topic: str, qos: QoSProfile = RELIABLE) -> Callable[[Message], None]:

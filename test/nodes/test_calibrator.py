@@ -1,0 +1,193 @@
+"""The calibrator over DDS, in a process of its own, on bags whose truth is known."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from action_msgs.msg import GoalStatus
+from compass_interfaces.action import Calibrate
+from compass_interfaces.msg import CalibrationStatus, CausalGraph, EpisodeInfo, Mismatch, SimParameters
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.srv import DescribeParameters, ListParameters
+from std_srvs.srv import Trigger
+
+from test.nodes.conftest import StartNode
+from test.nodes.harness import LATCHED, RELIABLE, Probe, until
+from test.nodes.recordings import record
+
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
+
+FRICTION = "puck1@dyna@friction_sliding"
+STATUS = "/calibrator/status"
+
+
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("bags")
+    record(folder, {FRICTION: 0.1, "env@camera@bias_x": 0.02}, shots=4, seed=5)
+    return folder
+
+
+def in_state(state: int) -> Callable[[CalibrationStatus], bool]:
+    return lambda status: bool(status.state == state)
+
+
+def saying(message: str) -> Callable[[CalibrationStatus], bool]:
+    return lambda status: bool(status.message == message)
+
+
+def ended(status: CalibrationStatus) -> bool:
+    return status.state not in (CalibrationStatus.IDLE, CalibrationStatus.RUNNING)
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def children(pid: int) -> list[int]:
+    """Processes that a process has started and that still run."""
+    return [
+        int(child) for task in Path(f"/proc/{pid}/task").iterdir() for child in (task / "children").read_text().split()
+    ]
+
+
+def test_a_start_with_bags_publishes_what_result_json_says(
+    bags: Path, tmp_path: Path, start_node: StartNode, probe: Probe
+) -> None:
+    output = tmp_path / "out" / "result"
+    start_node("calibrator", bags=str(bags), output=str(output), rollouts=600, seed=1)
+    diagnostics = probe.listen(DiagnosticArray, "/diagnostics")
+    status = probe.wait_for(probe.listen(CalibrationStatus, STATUS, LATCHED), ended, 120)
+    assert (status.state, status.message) == (CalibrationStatus.SUCCEEDED, f"result in {output}")
+
+    # All three arrive although this client subscribes after they were published.
+    parameters = probe.wait_for(probe.listen(SimParameters, "/calibrator/sim_parameters", LATCHED))
+    graph = probe.wait_for(probe.listen(CausalGraph, "/calibrator/causal_graph", LATCHED))
+    mismatch = probe.wait_for(probe.listen(Mismatch, "/calibrator/mismatch", LATCHED))
+    result = json.loads((output / "result.json").read_text())
+    assert (parameters.cell, parameters.source) == ("air_hockey", str(output / "result.json"))
+    assert [(row.name, row.value, row.active) for row in parameters.parameters] == [
+        (row["name"], row["value"], row["active"]) for row in result["parameters"]
+    ]
+    assert len(graph.psi) == len(graph.parameters) * len(graph.factors)
+    assert [*graph.psi[: len(graph.factors)]] == result["graph"]["psi"][0]
+    assert graph.sparsity == result["graph"]["sparsity"]
+    assert mismatch.verdict == result["mismatch"]["verdict"]
+    nominal = next(gap for gap in mismatch.gaps if (gap.model, gap.episodes) == ("nominal", "fit"))
+    assert dict(zip(nominal.factors, nominal.d, strict=True)) == result["gap"]["nominal"]["fit"]["d"]
+    assert names(tmp_path / "out") == ["result"]
+
+    said = probe.wait_for(
+        diagnostics,
+        lambda message: "calibration" in message.status[0].name and "succeeded" in message.status[0].message,
+    )
+    assert said.status[0].level == DiagnosticStatus.OK
+
+
+def test_feedback_a_second_one_refused_and_cancel_within_a_second(
+    bags: Path, tmp_path: Path, start_node: StartNode, probe: Probe
+) -> None:
+    output = tmp_path / "out" / "result"
+    node = start_node("calibrator", output=str(output))
+    heard = probe.listen(CalibrationStatus, STATUS, LATCHED)
+    probe.wait_for(heard, in_state(CalibrationStatus.IDLE))
+    action = probe.action(Calibrate, "/calibrator/calibrate")
+    feedback: list[Any] = []
+    goal = Calibrate.Goal(bags=[str(bags)], cell="air_hockey", seed=2)
+    handle = probe.result(action.send_goal_async(goal, feedback_callback=feedback.append))
+    assert handle.accepted
+    until(lambda: any(one.feedback.share_done > 0 for one in feedback), 60, "feedback with some share done")
+    newest = feedback[-1].feedback
+    assert newest.stage
+    assert newest.seconds_left > 0
+    assert children(node.process.pid)
+
+    # The node answers at once while it calibrates, and says no.
+    begin = time.monotonic()
+    refused = probe.call(Trigger, "/calibrator/recalibrate")
+    assert time.monotonic() - begin < 0.5
+    assert not refused.success
+    assert refused.message.startswith("refused: a calibration is already running")
+    second = probe.result(probe.result(action.send_goal_async(goal)).get_result_async())
+    assert second.status == GoalStatus.STATUS_ABORTED
+    assert second.result.message.startswith("refused: a calibration is already running")
+
+    begin = time.monotonic()
+    answer = handle.get_result_async()
+    probe.result(handle.cancel_goal_async())
+    cancelled = probe.result(answer)
+    assert time.monotonic() - begin < 1
+    assert cancelled.status == GoalStatus.STATUS_CANCELED
+    assert not cancelled.result.success
+    assert probe.wait_for(heard, ended).state == CalibrationStatus.CANCELLED
+    assert names(tmp_path / "out") == []
+    assert children(node.process.pid) == []
+
+
+def test_bad_input_is_one_line_and_the_node_goes_on(tmp_path: Path, start_node: StartNode, probe: Probe) -> None:
+    start_node("calibrator", output=str(tmp_path / "result"))
+    heard = probe.listen(CalibrationStatus, STATUS, LATCHED)
+    action = probe.action(Calibrate, "/calibrator/calibrate")
+    for goal, words in (
+        (Calibrate.Goal(), ["no bags"]),
+        (Calibrate.Goal(bags=["/no/such/bag"]), ["/no/such/bag"]),
+        (Calibrate.Goal(bags=["/no/such/bag"], cell="air_hokey"), ["air_hokey", "air_hockey"]),
+        (Calibrate.Goal(bags=["/no/such/bag"], output=str(tmp_path)), [str(tmp_path), "not overwritten"]),
+    ):
+        answer = probe.result(probe.result(action.send_goal_async(goal)).get_result_async(), 30)
+        assert answer.status == GoalStatus.STATUS_ABORTED
+        message = answer.result.message
+        assert all(word in message for word in words), message
+        assert "\n" not in message
+        assert "Traceback" not in message
+        probe.wait_for(heard, saying(message))
+    assert not (tmp_path / "result").exists()
+
+
+def test_the_end_of_the_node_ends_its_calibration(
+    bags: Path, tmp_path: Path, start_node: StartNode, probe: Probe
+) -> None:
+    output = tmp_path / "out" / "result"
+    node = start_node("calibrator", bags=[str(bags)], output=str(output))
+    heard = probe.listen(CalibrationStatus, STATUS, LATCHED)
+    probe.wait_for(heard, in_state(CalibrationStatus.RUNNING))
+    until(lambda: children(node.process.pid) != [], 5, "the calibration process")
+    child = Path("/proc", str(children(node.process.pid)[0]))
+    assert node.stop() == 0
+    assert not child.exists()
+    assert names(tmp_path / "out") == []
+    assert "Traceback" not in node.output()
+
+
+def test_finished_episodes_of_this_cell_are_calibrated_from(
+    tmp_path: Path, start_node: StartNode, probe: Probe
+) -> None:
+    start_node("calibrator", output=str(tmp_path / "result"))
+    say = probe.publisher(EpisodeInfo, "/recorder/status", RELIABLE)
+    assert "no bags" in probe.call(Trigger, "/calibrator/recalibrate").message
+    for state, cell, bag in (
+        (EpisodeInfo.RECORDING, "air_hockey", "/a"),
+        (EpisodeInfo.FINISHED, "push_i", "/b"),
+        (EpisodeInfo.FINISHED, "air_hockey", "/c"),
+        (EpisodeInfo.FINISHED, "air_hockey", "/c"),
+    ):
+        say(EpisodeInfo(state=state, cell=cell, bag=bag))
+    heard = probe.listen(CalibrationStatus, STATUS, LATCHED)
+    until(lambda: probe.call(Trigger, "/calibrator/recalibrate").success, 5, "the calibrator to hear of an episode")
+    failed = probe.wait_for(heard, ended, 30)
+    assert "/c" in failed.message, "the one finished episode of this cell does not exist, and that is what it says"
+
+
+def test_every_parameter_says_what_it_is(start_node: StartNode, probe: Probe) -> None:
+    start_node("calibrator")
+    listed = probe.call(ListParameters, "/calibrator/list_parameters").result.names
+    own = [name for name in listed if name != "use_sim_time" and "start_type_description" not in name]
+    assert sorted(own) == ["autostart", "bags", "cell", "output", "rollouts", "seed"]
+    request = DescribeParameters.Request(names=own)
+    described = probe.call(DescribeParameters, "/calibrator/describe_parameters", request).descriptors
+    assert all(one.description for one in described)
