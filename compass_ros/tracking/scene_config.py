@@ -48,6 +48,7 @@ class DiscConfig:
     radius_m: float = Field(default=0.0255, gt=0)
     height_m: float = Field(default=0.006, ge=0)
     handle_m: float = Field(default=0.0, ge=0, description="height at which the arm holds its handle; 0: no handle")
+    shadow: float = Field(default=0.38, ge=0, le=1, description="share of light that is missing in its shadow")
 
 
 @dataclass(frozen=True, config=_strict)

@@ -91,7 +91,7 @@ def _draw_disc(image: NDArray[np.uint8], scene: Scene, disc: DiscConfig, pose: F
     light = scene.light[window]
 
     shadow = near.cover(mean + np.array([0.004, -0.004]), disc.radius_m, 0.0, softness_m=0.006)
-    picture *= 1 - 0.38 * shadow[..., None]
+    picture *= 1 - disc.shadow * shadow[..., None]
     top = np.zeros(near.shape, np.float32)
     hull, rim, dot = top.copy(), top.copy(), top.copy()
     for x, y, yaw in pose:
