@@ -65,6 +65,8 @@ class CalibrationConfig:
 
     method: str = "default"
     seed: int = Field(0, ge=0)
+    rollouts: int = Field(0, ge=0, description="most simulated rollouts of the method; 0 = what it takes by default")
+    discover: bool = Field(True, description="look for missing physics after the calibration")
     held_out_share: float = Field(0.25, ge=0, lt=1, description="share of the episodes that is never fitted")
     threads: int = Field(0, ge=0, description="threads for rollouts; 0 = all cores. Results do not depend on it")
     compass: CompassConfig = Field(default_factory=CompassConfig)

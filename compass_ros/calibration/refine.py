@@ -97,9 +97,7 @@ def typical_residual(likelihood: Likelihood, point: Point) -> float:
 def residual_at(likelihood: Likelihood, point: Point) -> Floats:
     """(E, F, C) residuals at a point."""
     episodes = np.arange(len(likelihood.inputs))
-    return likelihood.residual(
-        np.tile(point.values, (len(episodes), 1)), likelihood.inputs + point.launch, episodes
-    )
+    return likelihood.residual(np.tile(point.values, (len(episodes), 1)), likelihood.inputs + point.launch, episodes)
 
 
 def chi_square(likelihood: Likelihood, fit: Fit) -> float:

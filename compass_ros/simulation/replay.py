@@ -103,7 +103,9 @@ class Replay:
         tiled = np.tile(values, (len(episodes), 1))
         d = self.differences(tiled, episodes).mean(axis=0)
         squared = (self.predict(tiled, episodes) - self.data.measured) ** 2
-        distance2 = np.concatenate([squared[:, :, list(columns)].sum(axis=2).ravel() for columns in _objects(self.simulator.cell)])
+        distance2 = np.concatenate(
+            [squared[:, :, list(columns)].sum(axis=2).ravel() for columns in _objects(self.simulator.cell)]
+        )
         names = [f.name for f in self.simulator.cell.factors]
         return Gap(dict(zip(names, d.tolist(), strict=True)), float(np.sqrt(np.nanmean(distance2))))
 

@@ -1,0 +1,33 @@
+"""The command `compass`: everything without ROS. Exit status 0: done; 1: the input is bad; 2: wrong use."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from compass_ros.commands import calibrate, record, track
+from compass_ros.commands import import_ as tables
+from compass_ros.errors import CompassError
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="What went wrong with my simulator? Calibrate it from recordings, and find the physics that it lacks.",
+)
+for module in (track, record, calibrate, tables):
+    module.add_to(app)
+
+
+def main() -> None:
+    """Run the command line; what a user can mend ends as one line and status 1."""
+    try:
+        app()
+    except CompassError as error:
+        print(f"compass: {error}", file=sys.stderr)
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Subcommands of `compass`, one file each; each adds itself to the application."""

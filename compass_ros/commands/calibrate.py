@@ -1,0 +1,125 @@
+"""`compass calibrate`: bags and a cell in; result.json, report.html, calibrated scene and effects out."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shlex
+import sys
+import time
+from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from compass_ros.commands.progress import Bar
+from compass_ros.types import Progress, Result
+
+
+class ProgressStyle(str, Enum):
+    """How progress is shown."""
+
+    bar = "bar"
+    json = "json"
+    none = "none"
+
+
+def add_to(app: typer.Typer) -> None:
+    app.command()(calibrate)
+
+
+def calibrate(
+    bags: Annotated[list[str], typer.Argument(help="bags, or folders of bags")],
+    cell: Annotated[str, typer.Option(help="name of a cell, or path of its YAML")] = "air_hockey",
+    out: Annotated[Path, typer.Option(help="folder of the result")] = Path("out/calibration"),
+    method: Annotated[str, typer.Option(help="default, compass, or a rival; see `compass bench --help`")] = "default",
+    seed: Annotated[int, typer.Option(min=0, help="decides which episodes are held out, and all random numbers")] = 0,
+    rollouts: Annotated[int, typer.Option(min=0, help="most simulated rollouts; 0: the method's own budget")] = 0,
+    held_out: Annotated[float, typer.Option(min=0, max=0.9, help="share of the episodes that is never fitted")] = 0.25,
+    config: Annotated[Path | None, typer.Option(help="YAML with any field of the configuration")] = None,
+    discover: Annotated[bool, typer.Option(help="look for missing physics after the calibration")] = True,
+    progress: Annotated[ProgressStyle, typer.Option(help="how to show progress")] = ProgressStyle.bar,
+) -> None:
+    """Find which simulator parameters are wrong, what they should be, and what physics is missing."""
+    run(bags, cell, out, settings(method, seed, rollouts, held_out, discover, config), progress)
+
+
+def settings(
+    method: str, seed: int, rollouts: int, held_out: float, discover: bool, config: Path | None
+) -> Mapping[str, object]:
+    """The configuration file's fields over the command line's."""
+    from compass_ros.config import read_yaml
+
+    given: dict[str, object] = {
+        "method": method,
+        "seed": seed,
+        "rollouts": rollouts,
+        "held_out_share": held_out,
+        "discover": discover,
+    }
+    return given | (dict(read_yaml(config)) if config else {})
+
+
+def run(
+    bags: list[str],
+    cell_name: str,
+    out: Path,
+    config: Mapping[str, object],
+    style: ProgressStyle,
+    truth: Mapping[str, float] | None = None,
+) -> Result:
+    """Calibrate, write everything into `out`, print the tables."""
+    from compass_ros.cells import load
+    from compass_ros.config import calibration_config
+    from compass_ros.episodes import Source, read_episodes
+    from compass_ros.pipeline import calibrate as pipeline
+    from compass_ros.reporting import print_result
+    from compass_ros.results import write_all
+
+    started = time.monotonic()
+    cell = load(cell_name)
+    validated = calibration_config(config, "command line")
+    sources = [Source(o.topic or f"/puck_tracker/{o.name}/pose", o.name, o.quantity) for o in cell.objects]
+    episodes = read_episodes(bags, sources, cell.name, cell.hash)
+    with _shown(style) as report:
+        result, found = pipeline(episodes, cell, validated, report)
+    result = replace(result, budget=replace(result.budget, wall_seconds=time.monotonic() - started))
+    write_all(result, found, cell, out, shlex.join(["compass", *sys.argv[1:]]), truth or {})
+    if style is ProgressStyle.bar:
+        print_result(result, truth)
+        print(f"report: {os.path.relpath(out / 'report.html')}")
+    return result
+
+
+def _shown(style: ProgressStyle) -> AbstractContextManager[Bar | _JsonLines | _Quiet]:
+    if style is ProgressStyle.bar:
+        return Bar()
+    return nullcontext(_JsonLines() if style is ProgressStyle.json else _Quiet())
+
+
+class _Quiet:
+    def __call__(self, progress: Progress) -> bool:
+        return True
+
+
+class _JsonLines:
+    """One JSON object a line on standard output, for programs that watch."""
+
+    def __call__(self, progress: Progress) -> bool:
+        def number(value: float) -> float | None:
+            return value if math.isfinite(value) else None
+
+        line = {
+            "stage": progress.stage,
+            "iteration": progress.iteration,
+            "done": progress.done,
+            "gap": number(progress.gap),
+            "sparsity": number(progress.sparsity),
+        }
+        print(json.dumps(line), flush=True)
+        return True

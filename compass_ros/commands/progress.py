@@ -1,0 +1,42 @@
+"""Progress bar of long computations."""
+
+from __future__ import annotations
+
+import math
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as RichProgress
+
+from compass_ros.types import Progress
+
+
+class Bar:
+    """A `types.Report` that draws a bar on standard error while its context is open."""
+
+    def __init__(self) -> None:
+        self._bar = RichProgress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TaskProgressColumn(),
+            TextColumn("{task.fields[gap]}"),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self._task = self._bar.add_task("reading", total=1.0, gap="")
+
+    def __enter__(self) -> Bar:
+        self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._bar.stop()
+
+    def __call__(self, progress: Progress) -> bool:
+        gap = f"gap {progress.gap:.3f} m" if math.isfinite(progress.gap) else ""
+        self._bar.update(self._task, completed=progress.done, description=progress.stage, gap=gap)
+        return True

@@ -1,0 +1,5 @@
+"""What is left after the best parameters: where, which physics, how much better with it."""
+
+from compass_ros.discovery.discover import Discovery, discover, not_evaluated
+
+__all__ = ["Discovery", "discover", "not_evaluated"]

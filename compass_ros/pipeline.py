@@ -1,0 +1,210 @@
+"""The whole method on one page: recordings in, parameters and verdict out."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Sequence
+from importlib.metadata import version
+
+import numpy as np
+
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.methods import compass_config, method
+from compass_ros.calibration.noise import Noise, measure_noise
+from compass_ros.calibration.problem import Allowance, Problem
+from compass_ros.cells import Cell
+from compass_ros.config import CalibrationConfig
+from compass_ros.discovery import Discovery, discover, not_evaluated
+from compass_ros.errors import DataError
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.replay import Recordings, Replay, recordings
+from compass_ros.types import (
+    Budget,
+    Episode,
+    Estimate,
+    Floats,
+    Gap,
+    Graph,
+    ParameterRow,
+    ReplayedTrack,
+    Report,
+    Result,
+    silent,
+)
+from compass_ros.types import Replay as Drawn
+
+
+def calibrate(
+    episodes: Sequence[Episode], cell: Cell, config: CalibrationConfig, report: Report = silent
+) -> tuple[Result, Discovery]:
+    """Which parameters, which values, what is left. Raises DataError where the recordings cannot answer.
+
+    The same episodes, cell and configuration give the same result, bit for bit. Wall time is for the caller to add.
+    """
+    fit, held_out = split(episodes, config)
+    simulator = Simulator(cell, threads=config.threads)
+    data, judge = recordings(cell, fit), recordings(cell, held_out or fit)
+    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m)
+    problem = pose(simulator, data, noise)
+
+    estimate = estimate_parameters(problem, config, report)
+    found = not_evaluated("discovery was switched off")
+    if config.discover:
+        found = discover(simulator, problem, estimate, judge, noise, report)
+    return assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, found), found
+
+
+def split(episodes: Sequence[Episode], config: CalibrationConfig) -> tuple[list[Episode], list[Episode]]:
+    """Episodes to fit and episodes that are never fitted; the choice depends on names and seed alone."""
+    if not episodes:
+        raise DataError("no episodes: nothing to calibrate with")
+
+    def rank(episode: Episode) -> str:
+        return hashlib.sha256(f"{config.seed}/{episode.name}".encode()).hexdigest()
+
+    count = round(config.held_out_share * len(episodes)) if len(episodes) > 1 else 0
+    chosen = {e.name for e in sorted(episodes, key=rank)[:count]}
+    ordered = sorted(episodes, key=lambda e: (e.name, e.start_ns))
+    return [e for e in ordered if e.name not in chosen], [e for e in ordered if e.name in chosen]
+
+
+def pose(simulator: Simulator, data: Recordings, noise: Noise) -> Problem:
+    """Recordings and a simulator as the problem that every method is given."""
+    cell = simulator.cell
+    replay = Replay(simulator, data)
+    likelihood = Likelihood(
+        predict=simulator.observe,
+        parameters=simulator.parameters,
+        inputs=data.inputs,
+        time_s=data.time_s,
+        measured=data.measured,
+        sigma=np.broadcast_to(noise.sigma, data.measured.shape).copy(),
+        correlation_time=noise.correlation_time,
+        launch_std=np.array([cell.spec.launch_noise.get(a.name, 0.0) for a in cell.action]),
+        prior_mean=simulator.defaults,
+        prior_std=np.array([p.half_width for p in simulator.parameters]),
+    )
+    return Problem(
+        differences=replay.differences,
+        trajectories=replay.predict,
+        measured=np.nan_to_num(data.measured),
+        weight=np.where(np.isnan(data.measured), 0.0, 1 / noise.sigma),
+        actions=data.inputs,
+        parameters=simulator.parameters,
+        factors=tuple(f.name for f in cell.factors),
+        start=simulator.defaults,
+        simulated_seconds=cell.duration,
+        likelihood=likelihood,
+    )
+
+
+def estimate_parameters(problem: Problem, config: CalibrationConfig, report: Report) -> Estimate:
+    """Run the configured method."""
+    compass = config.compass
+    real = min(compass.n_cmd_action, len(problem.actions))
+    allowance = Allowance(compass.n_round, real, compass.n_sim)
+    if config.rollouts:
+        iterations = max(config.rollouts // allowance.per_iteration, 1)
+        allowance = Allowance(iterations, real, max(min(compass.n_sim, config.rollouts // (iterations * real)), 2))
+    if config.method == "compass":
+        from compass_ros.calibration.compass import compass as run  # torch takes seconds to import
+
+        settings = compass_config(allowance, compass)
+        p = problem
+        return run(p.differences, p.actions, p.parameters, p.factors, p.start, settings, config.seed, report)
+    return method(config.method).run(problem, allowance, config.seed, report)
+
+
+def assemble(
+    cell: Cell,
+    config: CalibrationConfig,
+    simulator: Simulator,
+    data: Recordings,
+    judge: Recordings,
+    held_out: bool,
+    noise: Noise,
+    estimate: Estimate,
+    found: Discovery,
+) -> Result:
+    """Gaps on all episodes for each model, tables and drawings."""
+    values = found.parameters if found.parameters is not None else estimate.values
+    std = found.std if found.std is not None else estimate.std
+    models = {"nominal": (simulator, simulator.defaults), "calibrated": (simulator, estimate.values)}
+    if found.simulator is not None and found.values is not None:
+        models["with_effects"] = (found.simulator, found.values)
+    replays = {name: (Replay(s, data), Replay(s, judge), v) for name, (s, v) in models.items()}
+    gap: dict[str, dict[str, Gap]] = {
+        name: {"fit": fit.gap(v)} | ({"held_out": unseen.gap(v)} if held_out else {})
+        for name, (fit, unseen, v) in replays.items()
+    }
+    graph = estimate.graph or Graph(
+        tuple(p.name for p in cell.parameters),
+        tuple(f.name for f in cell.factors),
+        np.zeros((len(cell.parameters), len(cell.factors))),
+        0.5,
+    )
+    rows = tuple(
+        ParameterRow(p.name, p.unit, p.default, float(v), float(s), (p.low, p.high), bool(a), bool(i))
+        for p, v, s, a, i in zip(cell.parameters, values, std, graph.active(), estimate.identifiable, strict=True)
+    )
+    drawn = _draw(cell, data, {n: (r[0], r[2]) for n, r in replays.items()}, held_out=False)
+    if held_out:
+        drawn += _draw(cell, judge, {n: (r[1], r[2]) for n, r in replays.items()}, held_out=True)
+    spent = [s for s in (simulator, found.simulator) if s is not None]
+    return Result(
+        cell=cell.name,
+        method=estimate.method,
+        seed=config.seed,
+        versions=versions(),
+        budget=Budget(sum(s.rollouts for s in spent), sum(s.simulated_seconds for s in spent), 0.0),
+        fit=data.names,
+        held_out=judge.names if held_out else (),
+        gap=gap,  # type: ignore[arg-type]  # keys are the literals by construction
+        noise_floor_m=noise_floor(cell, noise),
+        parameters=rows,
+        graph=graph,
+        mismatch=found.mismatch,
+        trace=estimate.trace,
+        replays=drawn,
+        cancelled=estimate.stop_reason.startswith("cancelled"),
+        warnings=found.warnings,
+    )
+
+
+def noise_floor(cell: Cell, noise: Noise) -> float:
+    """Root mean square distance that the noise alone leaves [m]."""
+    objects = max(len(cell.objects), 1)
+    return float(np.sqrt(np.sum(noise.sigma**2) / objects))
+
+
+def versions() -> dict[str, str]:
+    """What the numbers depend on."""
+    names = ("compass_ros", "mujoco", "numpy", "scipy")
+    return {"python": platform.python_version()} | {name: version(name) for name in names}
+
+
+def _draw(cell: Cell, data: Recordings, models: dict[str, tuple[Replay, Floats]], held_out: bool) -> tuple[Drawn, ...]:
+    episodes = np.arange(len(data.names))
+    predicted = {
+        name: replay.predict(np.tile(values, (len(episodes), 1)), episodes) for name, (replay, values) in models.items()
+    }
+    columns = {o.name: [i for i, c in enumerate(cell.channels) if c == o.name] for o in cell.objects}
+    out = []
+    for e, name in enumerate(data.names):
+        tracks = []
+        for obj, own in columns.items():
+            seen = ~np.isnan(data.measured[e][:, own]).any(axis=1)
+            pick = {model: values[e][seen][:, own] for model, values in predicted.items()}
+            tracks.append(
+                ReplayedTrack(
+                    obj,
+                    data.time_s[e][seen],
+                    data.measured[e][seen][:, own],
+                    pick["nominal"],
+                    pick["calibrated"],
+                    pick.get("with_effects"),
+                )
+            )
+        out.append(Drawn(name, held_out, tuple(tracks)))
+    return tuple(out)

@@ -1,0 +1,47 @@
+"""Everything that a calibration leaves on disk: result.json, report.html, the calibrated scene and the effects."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from compass_ros.cells import Cell
+from compass_ros.discovery import Discovery
+from compass_ros.errors import ConfigError
+from compass_ros.reporting import ReportExtras, Scene, Shape, write_report, write_result
+from compass_ros.simulation.export import write_effects_of, write_scene
+from compass_ros.types import Result
+
+SCENE, EFFECTS = "scene.xml", "effects.yaml"
+
+
+def write_all(
+    result: Result, found: Discovery, cell: Cell, out: Path, command: str = "", truth: Mapping[str, float] | None = None
+) -> None:
+    """Write into `out`, each file whole or not at all; result.json last, so that its presence says that all is there."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out):
+            pass
+    except OSError as error:
+        raise ConfigError(f"{out}: cannot be written: {error.strerror}") from error
+    values = np.array([row.value for row in result.parameters])
+    write_scene(cell, values, out / SCENE)
+    write_effects_of(found.simulator, found.values, found.effect_std, cell, values, out / EFFECTS)
+    write_report(result, out / "report.html", ReportExtras(command, scene_of(cell), truth=dict(truth or {})))
+    write_result(result, out / "result.json")
+
+
+def scene_of(cell: Cell) -> Scene:
+    """What stands still on the table, for drawings; empty for cells without a table."""
+    if cell.spec.dynamics != "air_hockey":
+        return Scene()
+    shapes = (
+        Shape("rectangle", "table", (0.0, 0.0), (0.9, 0.45)),
+        Shape("circle", "goal", (0.43, 0.0), (0.3, 0.3)),
+        Shape("rectangle", "obstacle", (0.1, 0.0), (0.025, 0.18)),
+    )
+    return Scene(shapes, {"puck1": 0.0255, "puck2": 0.0255})
