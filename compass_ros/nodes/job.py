@@ -64,7 +64,7 @@ def command(request: Request, folder: Path) -> list[str]:
     words += ["--seed", str(request.seed), "--progress", "json"]
     if request.rollouts:
         words += ["--rollouts", str(request.rollouts)]
-    return [*words, *request.bags]
+    return [*words, "--", *request.bags]
 
 
 def prepare(output: Path) -> Path:
@@ -156,7 +156,7 @@ class Job:
         if self._cancelled:
             return Outcome.CANCELLED, "cancelled; nothing was written"
         if status == 1:
-            return Outcome.FAILED, error
+            return Outcome.FAILED, error.removeprefix("compass: ")
         if status:
             return Outcome.FAILED, f"the calibration process ended with status {status}: {error}"
         if self.output.exists():

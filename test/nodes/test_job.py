@@ -53,7 +53,7 @@ def test_an_earlier_result_is_replaced_whole(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("script", "message"),
     [
-        ("print('half a warning\\nbag.mcap: truncated', file=sys.stderr); sys.exit(1)", "bag.mcap: truncated"),
+        ("print('half a warning\\ncompass: bag.mcap: truncated', file=sys.stderr); sys.exit(1)", "bag.mcap: truncated"),
         ("sys.exit(1)", "it said nothing"),
         ("1 / 0", "ZeroDivisionError: division by zero"),
         ("sys.exit(2)", "the calibration process ended with status 2: it said nothing"),
@@ -70,6 +70,7 @@ def test_failure_is_one_line_and_keeps_the_earlier_result(tmp_path: Path, script
     assert job.outcome is Outcome.FAILED
     assert message in job.message
     assert "\n" not in job.message
+    assert not job.message.startswith("compass:")
     assert [path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*")] == ["out", "out/result.json"]
     assert (tmp_path / "out" / "result.json").read_text() == "old"
 
@@ -125,6 +126,6 @@ def test_progress_has_the_time_that_is_left() -> None:
 def test_command_hands_on_everything() -> None:
     request = Request(bags=("a", "b"), cell="air_hockey", seed=3, rollouts=0, output=Path("out"))
     words = ["--cell", "air_hockey", "--out", "tmp", "--seed", "3", "--progress", "json"]
-    assert command(request, Path("tmp"))[3:] == ["calibrate", *words, "a", "b"]
+    assert command(request, Path("tmp"))[3:] == ["calibrate", *words, "--", "a", "b"]
     budget = Request(bags=("a",), cell="x.yaml", seed=0, rollouts=500, output=Path("out"))
-    assert command(budget, Path("tmp"))[-3:] == ["--rollouts", "500", "a"]
+    assert command(budget, Path("tmp"))[-4:] == ["--rollouts", "500", "--", "a"]
