@@ -62,7 +62,8 @@ def test_a_shot_is_filmed_tracked_and_revealed_only_on_request(
     assert np.abs(gaps - 1e9 / 60).max() <= 1, "an image was lost, or a stamp is not the sensor's"
     assert len({tuple(joint.position) for joint in joints}) > 10
 
-    for d in diagnostics: print({v.key:v.value for v in d.status[0].values})
+    for d in diagnostics:
+        print({v.key: v.value for v in d.status[0].values})
     # the tracker against a simulation of the same truth, which no topic has carried
     cell = load("air_hockey")
     values = np.array([TRUTH.get(p.name, p.default) for p in cell.parameters])
