@@ -152,7 +152,7 @@ def _scan_sqlite3(path: Path) -> Iterator[RawTopic | RawMessage]:
     try:
         with closing(sqlite3.connect(f"{path.absolute().as_uri()}?immutable=1", uri=True)) as database:
             yield from _sqlite3_messages(path, database)
-    except (sqlite3.Error, OverflowError, MemoryError) as error:
+    except (sqlite3.Error, ValueError, OverflowError, MemoryError) as error:
         raise BagError(f"{path}: not a readable rosbag2 database: {error}") from error
 
 

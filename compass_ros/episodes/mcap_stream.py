@@ -15,7 +15,7 @@ from mcap.records import Channel, Chunk, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 
 LARGEST_CHUNK = 256 * 2**20
-"""A chunk that unpacks to more than this is refused [bytes]."""
+"""A record that is longer than this, or a chunk that unpacks to more, is refused [bytes]."""
 
 BROKEN = (McapError, ValueError, RuntimeError, EOFError, OverflowError, zstandard.ZstdError)
 """What a damaged file raises: mcap's own errors, bad text or checksums (ValueError), lz4 (RuntimeError), zstd."""
@@ -42,11 +42,13 @@ def records(path: Path) -> Iterator[Schema | Channel | Message | Metadata]:
     """The records of a whole MCAP file in their order, those in chunks included.
 
     Raises one of `BROKEN` where the file is damaged or ends early (the data's checksum is verified), OSError where it
-    cannot be read. Memory is bounded by the largest record that is really in the file, and by LARGEST_CHUNK.
+    cannot be read. Memory is bounded by the largest record that is really in the file and by LARGEST_CHUNK.
     """
     with path.open("rb") as file:
         stream = _ExactStream(file, path.stat().st_size)
-        reader = StreamReader(cast(IO[bytes], stream), emit_chunks=True, validate_crcs=True)
+        reader = StreamReader(
+            cast(IO[bytes], stream), emit_chunks=True, validate_crcs=True, record_size_limit=LARGEST_CHUNK
+        )
         for record in reader.records:
             if isinstance(record, Chunk):
                 yield from _inside(record)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -60,22 +61,44 @@ def read_summary(folder: Path) -> BagSummary:
     try:
         if path.stat().st_size > _LARGEST:
             raise BagError(f"{path}: larger than {_LARGEST} bytes; expected a rosbag2 metadata.yaml")
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        content = _plain(path.read_text(encoding="utf-8"))
         information = content["rosbag2_bagfile_information"]
         return BagSummary(
-            storage=str(information["storage_identifier"]),
-            files=tuple(Path(str(name)).name for name in information["relative_file_paths"]),
+            storage=_text(information["storage_identifier"]),
+            files=tuple(Path(_text(name)).name for name in information["relative_file_paths"]),
             start_ns=int(information["starting_time"]["nanoseconds_since_epoch"]),
             duration_ns=int(information["duration"]["nanoseconds"]),
             messages=int(information["message_count"]),
             topics=tuple(_topic(entry) for entry in information["topics_with_message_count"]),
-            compression=str(information.get("compression_mode") or "").lower().removeprefix("none"),
+            compression=_text(information.get("compression_mode") or "").lower().removeprefix("none"),
         )
     except OSError as error:
         raise BagError(f"{path}: cannot be read: {error.strerror}") from error
     except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, RecursionError, OverflowError) as error:
         found = " ".join(str(error).split())[:200]
         raise BagError(f"{path}: expected a rosbag2 metadata.yaml, found {type(error).__name__}: {found}") from error
+
+
+def qos_profiles(text: str) -> list[object]:
+    """The profiles in a YAML text as bags hold it; none where the text is something else."""
+    try:
+        found = _plain(text)
+    except (yaml.YAMLError, ValueError, RecursionError):
+        return []
+    return found if isinstance(found, list) else []
+
+
+class _PlainLoader(yaml.SafeLoader):
+    """Takes no aliases: a few lines of them can stand for more than any memory holds."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            raise yaml.YAMLError("aliases are not read")
+        return super().compose_node(parent, index)
+
+
+def _plain(text: str) -> Any:
+    return yaml.load(text, Loader=_PlainLoader)  # noqa: S506  (a SafeLoader with less)
 
 
 class _PlainDumper(yaml.SafeDumper):
@@ -92,8 +115,14 @@ def _topic(entry: Mapping[str, object]) -> TopicCount:
     messages = entry["message_count"]
     if not isinstance(messages, int):
         raise TypeError("message_count is not a number")
-    digest = metadata.get("type_description_hash") or ""
-    return TopicCount(str(metadata["name"]), str(metadata["type"]), str(digest), messages)
+    digest = _text(metadata.get("type_description_hash") or "")
+    return TopicCount(_text(metadata["name"]), _text(metadata["type"]), digest, messages)
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"expected text, found {type(value).__name__}")
+    return value
 
 
 def _content(summary: BagSummary) -> Mapping[str, object]:
@@ -124,7 +153,7 @@ def _topic_content(topic: TopicCount) -> Mapping[str, object]:
             "name": topic.name,
             "type": topic.type,
             "serialization_format": "cdr",
-            "offered_qos_profiles": yaml.safe_load(topic.qos) if topic.qos else [],
+            "offered_qos_profiles": qos_profiles(topic.qos),
             "type_description_hash": topic.digest,
         },
         "message_count": topic.messages,

@@ -85,7 +85,7 @@ def mat_tables(path: Path, pattern: str, group_by: str) -> Iterator[Table]:
     except KeyError as error:
         known = ", ".join(name for name, *_ in scipy.io.whosmat(str(path)))
         raise DataError(f"{path}: no variable {error}; it has {known}") from error
-    except (OSError, ValueError, TypeError, NotImplementedError, scipy.io.matlab.MatReadError) as error:
+    except (OSError, ValueError, TypeError, IndexError, NotImplementedError, scipy.io.matlab.MatReadError) as error:
         raise DataError(f"{path}: cannot be read as MAT with cells of numbers: {error}") from error
     for index, cells in enumerate(zip(*variables.values(), strict=True)):
         columns: dict[str, Floats] = {}
@@ -109,6 +109,9 @@ def _parted(path: Path, key: str, rows: Sequence[Sequence[object]], group_by: st
         raise DataError(f"{path}: '{key}' is empty; expected a header line and rows of numbers")
     names = [str(name).strip() for name in rows[0] if name is not None]
     filled = [row for row in rows[1:] if any(cell not in (None, "") for cell in row)]
+    for row in filled:
+        if any(cell not in (None, "") for cell in row[len(names) :]) or len(row) < len(names):
+            raise DataError(f"{path}: '{key}' has {len(names)} columns, but a row with {len(row)}: {list(row)[:12]}")
     if group_by and group_by not in names:
         raise DataError(f"{path}: '{key}' has no column '{group_by}'; it has {', '.join(names)}")
     groups: dict[str, list[Sequence[object]]] = {}

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import re
+import reprlib
 from collections.abc import Sequence
 from dataclasses import field
 from pathlib import Path, PurePosixPath
+from string import Formatter
 from typing import Annotated, Literal
 
 import numpy as np
@@ -115,7 +117,7 @@ def _config(path: Path) -> ImportConfig:
         where = ".".join(str(part) for part in first["loc"])
         hint = nearest(str(first["loc"][-1]), ImportConfig.__dataclass_fields__)
         hint = hint if first["type"] == "unexpected_keyword_argument" else ""
-        raise ConfigError(f"{path}: {where}: {first['msg']}, found {first['input']!r}{hint}") from error
+        raise ConfigError(f"{path}: {where}: {first['msg']}, found {reprlib.repr(first['input'])}{hint}") from error
 
 
 def _roots(path: Path) -> list[Path]:
@@ -148,10 +150,7 @@ def _tables(recordings: Recordings, file: Path) -> list[Table]:
 
 
 def _episode(config: ImportConfig, recordings: Recordings, file: Path, table: Table) -> Episode:
-    try:
-        name = re.sub(r"[^A-Za-z0-9_.-]+", "_", recordings.name.format(**table.labels))
-    except (KeyError, IndexError, ValueError, AttributeError) as error:
-        raise ConfigError(f"name '{recordings.name}': expected only {{{'}, {'.join(table.labels)}}}") from error
+    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", _filled(recordings.name, table))
     try:
         stamps = _stamps(config.time, table)
         tracks = tuple(_track(target, columns, stamps, table) for target, columns in config.tracks.items())
@@ -160,6 +159,17 @@ def _episode(config: ImportConfig, recordings: Recordings, file: Path, table: Ta
         return Episode(episode_name(name), config.cell, "", action, int(stamps[0]), tracks, initial)
     except (DataError, BagError) as error:
         raise DataError(f"{file}: {name}: {error}") from error
+
+
+def _filled(template: str, table: Table) -> str:
+    """A name with its labels put in. Raises ConfigError for anything in braces that is not a label."""
+    try:
+        fields = {name for _, name, _, _ in Formatter().parse(template) if name is not None}
+        if fields <= table.labels.keys():
+            return template.format(**table.labels)
+    except ValueError as error:
+        raise ConfigError(f"name '{template}': {error}") from error
+    raise ConfigError(f"name '{template}': expected only {', '.join(f'{{{label}}}' for label in table.labels)}")
 
 
 def _stamps(time: TimeColumn, table: Table) -> Ints:
