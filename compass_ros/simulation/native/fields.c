@@ -18,7 +18,7 @@ enum { N_NUMBERS = 8, TABLE = 1 << 16 };
 enum Kind {
   TABLE_FRICTION = 1, UNIFORM = 2, VISCOUS = 3, QUADRATIC = 4, CROSSWIND = 5, FAN = 6, SWIRL = 7, ATTRACTION = 8,
   FRICTION_PATCH = 9, FRICTION_GRADIENT = 10, ANISOTROPIC = 11, STRIBECK = 12, COULOMB = 13, MAGNUS = 14, PULSATING = 15,
-  RATE_RESTITUTION = 16, TANGENTIAL = 17, LIBRARY = 18,
+  RATE_RESTITUTION = 16, TANGENTIAL = 17, LIBRARY = 18, HAT = 19,
 };
 
 // What the object is, and so where its forces go.
@@ -137,8 +137,25 @@ static Force evaluate(const Term* term, const State* s) {
       if (p[6] == 2) return along(s, value, 1e-3);
       return p[6] == 0 ? (Force){value, 0, 0} : (Force){0, value, 0};
     }
+    case HAT: {            // p: acceleration x, y, time of the peak, half-width in time
+      double k = s->mass * fmax(0, 1 - fabs(s->time - p[2]) / p[3]);
+      return (Force){k * p[0], k * p[1], 0};
+    }
     default:
       return (Force){0, 0, 0};
+  }
+}
+
+// The forces of n terms in n states, six numbers each (x, y, vx, vy, mass, time), for bodies on a table; (n, 2) out.
+void compass_evaluate(int64_t n, const Term* term, const double* state, double gravity, double* out) {
+  for (int64_t i = 0; i < n; i++) {
+    const double* row = state + 6 * i;
+    State s = {.x = row[0], .y = row[1], .vx = row[2], .vy = row[3], .mass = row[4], .time = row[5]};
+    s.speed = sqrt(s.vx * s.vx + s.vy * s.vy);
+    s.weight = s.mass * gravity;
+    Force f = evaluate(term + i, &s);
+    out[2 * i] = f.x;
+    out[2 * i + 1] = f.y;
   }
 }
 

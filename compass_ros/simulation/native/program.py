@@ -40,6 +40,7 @@ class Kind(IntEnum):
     RATE_RESTITUTION = 16
     TANGENTIAL = 17
     LIBRARY = 18
+    HAT = 19
 
 
 class Placement(IntEnum):
@@ -95,6 +96,20 @@ class Programs:
         self._memory.clear()
 
 
+def evaluate(term: Term, states: Floats, gravity: float) -> Floats:
+    """(B, F, 2) planar forces [N] of a term in (B, F, 6) states: x, y, vx, vy, mass, time. Same code as in a rollout."""
+    batch, frames = states.shape[:2]
+    rows = np.zeros((batch, frames), _TERM)
+    rows["kind"] = term.kind
+    rows["number"][:, :, : term.numbers.shape[1]] = term.numbers[:, None]
+    given = np.ascontiguousarray(states, dtype=np.float64)
+    out = np.zeros((batch, frames, 2))
+    _library().compass_evaluate(
+        batch * frames, rows.ctypes.data, given.ctypes.data, ctypes.c_double(gravity), out.ctypes.data
+    )
+    return out
+
+
 def _place(model: mujoco.MjModel, name: str) -> tuple[Placement, int, int]:
     """How the forces on a body (or joint) of that name reach the model's degrees of freedom."""
     joint_id = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
@@ -116,6 +131,8 @@ def _library() -> ctypes.CDLL:
     core = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco.so*"))))
     library.compass_register.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
     library.compass_register.restype = None
+    library.compass_evaluate.argtypes = [ctypes.c_int64, *2 * [ctypes.c_void_p], ctypes.c_double, ctypes.c_void_p]
+    library.compass_evaluate.restype = None
     library.compass_init.argtypes = [ctypes.c_void_p]
     library.compass_init(ctypes.cast(core.mj_applyFT, ctypes.c_void_p))
     callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
