@@ -50,8 +50,8 @@ $(STAMPS)/locked: requirements.lock | $(BIN)/python
 # Editable, so that the sources are what runs. An editable install compiles the native library beside its source, but
 # carries no data files; the second command puts those where `ros2 run` looks.
 $(STAMPS)/package: $(STAMPS)/locked setup.py setup.cfg pyproject.toml package.xml $(SHARED) $(NATIVE)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps --editable .
-	$(BIN)/python -W ignore setup.py --quiet install_data --install-dir $(VENV)
+	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps -e .
+	PYTHONWARNINGS=ignore $(BIN)/python setup.py --quiet install_data --install-dir $(VENV)
 	@touch $@
 
 lock:
