@@ -7,15 +7,12 @@ is published as measured; one that is hidden is published as predicted, with a s
 
 from __future__ import annotations
 
-import sys
 import time
 from dataclasses import dataclass, field
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
@@ -24,6 +21,7 @@ from visualization_msgs.msg import MarkerArray
 
 from compass_ros.errors import CompassError
 from compass_ros.nodes import images
+from compass_ros.nodes.run import run
 from compass_ros.nodes.tracker_parameters import declare_tracker, tracker_of
 from compass_ros.tracking.camera import CameraModel
 from compass_ros.tracking.draw import annotate
@@ -157,15 +155,7 @@ class PuckTracker(Node):
 
 def main() -> None:
     use_one_core()
-    rclpy.init()
-    try:
-        rclpy.spin(PuckTracker())
-    except CompassError as error:
-        sys.exit(f"puck_tracker: {error}")
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        rclpy.try_shutdown()
+    run(PuckTracker, "puck_tracker")
 
 
 if __name__ == "__main__":

@@ -12,14 +12,11 @@ real cell: table, walls and obstacle stand shifted against the fiducials.
 from __future__ import annotations
 
 import json
-import sys
 
 import numpy as np
-import rclpy
 from compass_interfaces.msg import ShotCommand
 from numpy.typing import NDArray
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import CameraInfo, Image, JointState
@@ -29,6 +26,7 @@ from compass_ros.cells import load
 from compass_ros.errors import CompassError, ConfigError
 from compass_ros.nodes import images
 from compass_ros.nodes.play import action_of, hidden_values, play, resting, table_shift
+from compass_ros.nodes.run import run
 from compass_ros.simulation import Simulator
 from compass_ros.tracking.arm import arm_pose
 from compass_ros.tracking.scene_config import SceneConfig, scene_config
@@ -143,15 +141,7 @@ class VirtualCell(Node):
 
 def main() -> None:
     use_one_core()
-    rclpy.init()
-    try:
-        rclpy.spin(VirtualCell())
-    except CompassError as error:
-        sys.exit(f"virtual_cell: {error}")
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        rclpy.try_shutdown()
+    run(VirtualCell, "virtual_cell")
 
 
 if __name__ == "__main__":

@@ -17,6 +17,9 @@ _LEAST_SHARE = 0.12
 """A spot that shows less of an object's disc is not looked at."""
 _WHOLE_SHARE = 0.85
 """From this share on, the spot's centroid is near enough to the object's centre."""
+_NEAR = 0.3
+"""An expected place is believed when the centroid of the whole spot is within this share of the radius."""
+_NOWHERE: Floats = np.zeros((0, 2))
 _MOST_SHARE = 6.0
 """Objects of one colour that touch make one spot; a larger one is something else."""
 
@@ -49,8 +52,14 @@ def colour_mask(hsv: NDArray[np.uint8], look: ObjectConfig) -> NDArray[np.uint8]
     return np.asarray(masks[0] if len(masks) == 1 else cv2.bitwise_or(*masks), dtype=np.uint8)
 
 
-def find_blobs(hsv: NDArray[np.uint8], view: TableView, look: ObjectConfig) -> tuple[Blob, ...]:
-    """Spots that can be the object or a part of it, the largest first."""
+def find_blobs(
+    hsv: NDArray[np.uint8], view: TableView, look: ObjectConfig, expected: Floats = _NOWHERE
+) -> tuple[Blob, ...]:
+    """Spots that can be the object or a part of it, the largest first.
+
+    `expected` (K, 2): where such objects should be [m]; a spot there takes that place for its guess, which is better
+    than what it shows itself.
+    """
     mask = colour_mask(hsv, look)
     count, labels, stats, centroids = cv2.connectedComponentsWithStats(mask, connectivity=4)
     if count < 2:
@@ -65,8 +74,12 @@ def find_blobs(hsv: NDArray[np.uint8], view: TableView, look: ObjectConfig) -> t
     centres = view.table_from_pixel(pixels[fitting], look.height_m)
     blobs = []
     for index, centre in zip(fitting, centres, strict=True):
+        whole = shares[index] >= _WHOLE_SHARE
+        away = np.linalg.norm(expected - centre, axis=1)
         guess = centre
-        if shares[index] < _WHOLE_SHARE:
+        if away.size and away.min() < (_NEAR if whole else 1.0) * look.radius_m:
+            guess = expected[away.argmin()]
+        elif not whole:
             x, y, width, height = stats[index + 1, :4]
             spot = np.asarray(labels[y : y + height, x : x + width] == index + 1, dtype=np.uint8)
             guess = _vote(spot, (x, y), centre, view, look)

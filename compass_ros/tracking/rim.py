@@ -25,7 +25,7 @@ from compass_ros.types import Bools, Floats
 
 _RADII = 48
 """Radii around a disc."""
-_REACH = np.linspace(0.62, 1.38, 33)
+_REACH = np.linspace(0.66, 1.32, 25)
 """Where each radius is sampled, in units of the disc's radius."""
 _INNER = (_REACH > 0.68) & (_REACH < 0.87)
 _OUTER = (_REACH > 1.12) & (_REACH < 1.26)

@@ -22,6 +22,8 @@ from compass_ros.types import Floats
 _FULL_SEARCHES = 5
 """Images in which all markers are looked for; afterwards one marker at a time."""
 _RECHECK_EVERY = 8
+_HIDDEN_STD_M = 0.001
+"""Standard deviation that a rim hidden as a whole would have; in proportion to the hidden share."""
 _SAME_M = 0.006
 """Measurements of like-coloured discs nearer to each other than this are one."""
 _RESTART_NS = 1_000_000_000
@@ -94,12 +96,12 @@ def step(
         if state.stamp_ns - stamp_ns < _RESTART_NS:
             return state, Frame(stamp_ns, (), f"image out of order: stamp {stamp_ns} ns after {state.stamp_ns} ns")
         state = replace(state, motions={})
-    fix = _look_for_table(state, image, camera, config)
+    fix, last_ns = _look_for_table(state, image, camera, config), state.stamp_ns
     state = replace(state, fix=fix, stamp_ns=stamp_ns, images=state.images + 1)
     if fix.view is None:
         return state, Frame(stamp_ns, (), fix.problem)
     predicted = {name: predict(m, stamp_ns, config.acceleration_std) for name, m in state.motions.items()}
-    found = assign(_detect(image, fix.view, predicted, config), predicted, config)
+    found = assign(_detect(image, fix.view, predicted, last_ns, config), predicted, config)
     motions, sightings = {}, []
     for name in config.objects:
         sighting = _sight(name, stamp_ns, found.get(name), predicted.get(name), config)
@@ -124,20 +126,29 @@ def _look_for_table(
 
 
 def _detect(
-    image: NDArray[np.uint8], view: TableView, predicted: Mapping[str, Motion], config: TrackerConfig
+    image: NDArray[np.uint8],
+    view: TableView,
+    predicted: Mapping[str, Motion],
+    last_ns: int | None,
+    config: TrackerConfig,
 ) -> list[Detection]:
-    """Discs in the image: sought where a spot of their colour is and where they were predicted."""
+    """Discs in the image: sought where a spot of their colour is, and near it where they were predicted.
+
+    `last_ns`: stamp of the image before.
+    """
     hsv = hue_image(image)
     seeds: list[Floats] = []
     looks: list[ObjectConfig] = []
     # objects that look alike are one search
     for look in dict.fromkeys(config.objects.values()):
-        blobs = [b for b in find_blobs(hsv, view, look) if np.all(np.abs(b.xy) < [config.x_limit_m, config.y_limit_m])]
-        names = [name for name, other in config.objects.items() if other == look]
-        whole = len(names) == 1 and len(blobs) == 1 and 0.85 < blobs[0].share < 1.3
-        guesses = [blob.xy for blob in blobs]
-        if blobs and not whole:
-            guesses += [predicted[name].mean[:2] for name in names if name in predicted]
+        known = [predicted[name] for name, other in config.objects.items() if other == look and name in predicted]
+        # after a miss the prediction is not trusted to be near
+        expected = [motion.mean[:2] for motion in known if motion.seen_ns == last_ns]
+        blobs = find_blobs(hsv, view, look, np.array(expected).reshape(-1, 2))
+        guesses = [b.xy for b in blobs if np.all(np.abs(b.xy) < [config.x_limit_m, config.y_limit_m])]
+        if guesses and len(known) > 1:
+            # discs that look alike and touch make one spot
+            guesses += [motion.mean[:2] for motion in known]
         seeds += guesses
         looks += [look] * len(guesses)
     if not seeds:
@@ -147,7 +158,8 @@ def _detect(
     detections: list[Detection] = []
     # the best supported first: a second measurement of the same disc is dropped
     for i in np.argsort(-fit.arc):
-        covariance = fit.covariance[i] + systematic
+        # the edge of what hides a disc can pass for its rim: the less is seen, the less is sure
+        covariance = fit.covariance[i] + systematic + np.eye(2) * (_HIDDEN_STD_M * (1 - fit.arc[i])) ** 2
         sure = fit.arc[i] >= config.min_arc and np.sqrt(np.linalg.eigvalsh(covariance)[-1]) <= config.max_std_m
         again = any(d.look == looks[i] and np.linalg.norm(d.xy - fit.xy[i]) < _SAME_M for d in detections)
         if sure and not again:

@@ -128,6 +128,7 @@ def test_trouble_is_said_once_in_one_line_and_passes(
     until(lambda: bool(send(gray[:240])) and "camera_info says 640x480" in tracker.output(), 10, "a size complaint")
     count = len(heard)
     until(lambda: bool(send()) and len(heard) > count, 10, "a pose after a bad image")
+    assert tracker.stop() == 0
     assert "Traceback" not in tracker.output()
 
 
