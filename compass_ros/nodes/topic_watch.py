@@ -64,16 +64,17 @@ class TopicWatch:
     def _follow(self, topic: str, publishers: Sequence[TopicEndpointInfo]) -> None:
         """Keep the type that is received as long as anybody publishes it; else take another (the first by name)."""
         types = {publisher.topic_type for publisher in publishers}
-        now = self._connections.get(topic)
+        now = self._connections.get(topic) if topic in self._subscriptions else None
         if len(types) > 1:
             self._problems[topic] = f"{topic} is published with {len(types)} types: {', '.join(sorted(types))}"
         if now is not None and now.definition.type in types:
             return
+        if topic in self._subscriptions:  # one participant holds one type of a topic, until the executor lets go of it
+            self._node.destroy_subscription(self._subscriptions.pop(topic))
+            return  # received again from the next look on
         kind = min(types)
         offered = [publisher for publisher in publishers if publisher.topic_type == kind]
         definition, message_class = _definition(kind, offered), _class(kind)
-        if topic in self._subscriptions:
-            self._node.destroy_subscription(self._subscriptions.pop(topic))
         self._connections[topic] = Connection(topic, definition, qos_yaml(offered))
         self._connected(self._connections[topic])
         receive = partial(self._receive, topic)
