@@ -27,6 +27,7 @@ HOMES = {
     ("rclpy", "launch", "launch_ros", "ament_index_python", "rcl_interfaces", "action_msgs"): {"nodes"},
     ("builtin_interfaces", "std_msgs", "std_srvs", "sensor_msgs", "geometry_msgs"): {"nodes"},
     ("visualization_msgs", "diagnostic_msgs", "compass_interfaces"): {"nodes"},
+    ("domain_coordinator",): {"nodes", "demo"},
 }
 """Which parts of the package may import these libraries."""
 HOME = {library: parts for libraries, parts in HOMES.items() for library in libraries}

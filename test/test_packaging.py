@@ -16,7 +16,7 @@ import pytest
 from test.test_layering import HOMES, MODULES, ROOT, imports
 
 NODES = ("calibrator", "puck_tracker", "recorder", "virtual_cell")
-FROM_ROS = {library for libraries, parts in HOMES.items() for library in libraries if parts == {"nodes"}}
+FROM_ROS = {library for libraries, parts in HOMES.items() for library in libraries if "nodes" in parts}
 PREFIX = Path(sys.prefix)
 
 
