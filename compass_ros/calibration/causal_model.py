@@ -134,7 +134,9 @@ class Training:
     cancelled: bool
 
 
-def loss(model: CausalModel, prediction: Tensor, target: Tensor, sparse_weight: float, norm_p: float) -> tuple[Tensor, Tensor]:
+def loss(
+    model: CausalModel, prediction: Tensor, target: Tensor, sparse_weight: float, norm_p: float
+) -> tuple[Tensor, Tensor]:
     """Loss (2) and its first term: mean over samples of ||f - d||_2^2, plus lambda ||psi||_p^p."""
     mse = (prediction - target).square().sum(dim=1).mean()
     return mse + sparse_weight * model.psi.pow(norm_p).sum(), mse

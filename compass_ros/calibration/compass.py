@@ -74,7 +74,10 @@ def compass(
             trace.append(Iteration(values, measured, psi, spent))
             gap = float(measured.mean())
             if gap <= config.stop_gap_m:
-                reason, converged = f"the mean trajectory difference {gap:.4g} m is at or below {config.stop_gap_m:g} m", True
+                reason, converged = (
+                    f"the mean trajectory difference {gap:.4g} m is at or below {config.stop_gap_m:g} m",
+                    True,
+                )
                 break
             if i == config.n_round:
                 break

@@ -6,6 +6,8 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 from mujoco import minimize
 
@@ -59,7 +61,8 @@ def mujoco_sysid(problem: Problem, allowance: Allowance, seed: int, report: Repo
             bounds=bounds,
             eps=STEP,
             max_iter=allowance.rollouts,
-            verbose=minimize.Verbosity.SILENT,
+            verbose=minimize.Verbosity.FULLITER,  # as sysid does: only then a log has its Jacobian
+            output=io.StringIO(),
             iter_callback=remember,
         )
         record.measure(problem.low + width * np.asarray(found).ravel())

@@ -44,6 +44,7 @@ def tune_net(problem: Problem, allowance: Allowance, seed: int, report: Report) 
         for i in range(UPDATES if not record.cancelled else 0):
             all_episodes = problem.episodes
             here = problem.trajectories(np.tile(current, (len(all_episodes), 1)), all_episodes)
+            record.spend(len(all_episodes))
             real = vectors(problem, problem.measured, all_episodes)
             pair = (vectors(problem, here, all_episodes), real)
             scaled = [(side - mean) / deviation for side in pair]
