@@ -112,6 +112,7 @@ class _Content:
         self.shots: list[tuple[str, Shot]] = []
         self.notes = Notes()
         self._by_topic: dict[str, list[Source]] = {}
+        self._types: dict[str, str] = {}
         for source in tracks:
             self._by_topic.setdefault(source.topic, []).append(source)
 
@@ -126,6 +127,8 @@ class _Content:
         elif (topic.name, topic.type) == (NOTES_TOPIC, STRING_TYPE):
             self.notes = notes(decode(message))
         for source in self._by_topic.get(topic.name, ()):
+            if self._types.setdefault(topic.name, topic.type) != topic.type:
+                raise BagError(f"{topic.name} changes from {self._types[topic.name]} to {topic.type} in this bag")
             if topic.type not in KNOWN_TYPES:
                 raise BagError(f"{topic.name} is a {topic.type}; expected one of {', '.join(sorted(KNOWN_TYPES))}")
             self.tracks[source] += rows(decode(message), topic.type, source)

@@ -225,8 +225,8 @@ class Recorder:
         found = unfinished(self.folder)
         if not found:
             return ""
-        bags = " ".join(str(path) for path in found)
-        return f"{len(found)} bags have no end; run: compass record --recover {bags}"
+        names = ", ".join(path.name for path in found)
+        return f"bags without an end: {names}; run: compass record --recover {self.folder}"
 
 
 def _hold(folder: Path) -> int:
