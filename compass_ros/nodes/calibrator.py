@@ -78,6 +78,7 @@ class Calibrator(Node):
         self.declare_parameter("seed", 0, describe("seed of all random numbers", integer_range=natural))
         rollouts = "budget of simulated rollouts [count]; 0: the method's default"
         self.declare_parameter("rollouts", 0, describe(rollouts, integer_range=natural))
+        self.declare_parameter("method", "default", describe("as `compass calibrate --method`"))
         output = "folder of the result; an earlier result there is replaced when the new one is complete"
         self.declare_parameter("output", "out/calibration", describe(output))
         self.declare_parameter("autostart", True, describe("calibrate when the node starts, if `bags` names any"))
@@ -103,6 +104,7 @@ class Calibrator(Node):
             seed=goal.seed or self.get_parameter("seed").value,
             rollouts=goal.rollouts or self.get_parameter("rollouts").value,
             output=Path(goal.output or self.get_parameter("output").value),
+            method=self.get_parameter("method").value,
         )
 
     def _begin(self, goal: Calibrate.Goal) -> Job:

@@ -47,6 +47,7 @@ class Request:
     """Budget of simulated rollouts; 0: the method's default."""
     output: Path
     """Folder of the result. It is made, or replaced where it holds an earlier result; nothing else is overwritten."""
+    method: str = "default"
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class Step:
 def command(request: Request, folder: Path) -> list[str]:
     """The command line that does the work and leaves its result in `folder`."""
     words = [sys.executable, "-m", "compass_ros.cli", "calibrate", "--cell", request.cell, "--out", str(folder)]
-    words += ["--seed", str(request.seed), "--progress", "json"]
+    words += ["--method", request.method, "--seed", str(request.seed), "--progress", "json"]
     if request.rollouts:
         words += ["--rollouts", str(request.rollouts)]
     return [*words, "--", *request.bags]

@@ -49,7 +49,7 @@ class VirtualCell(Node):
         self._simulator = Simulator(self._cell, threads=1)
         self._scene = self._read_scene()
         self._camera = make_camera(self._scene, seed, table_shift(self._cell, self._values))
-        self._play = resting(self._simulator, self._scene, self._values)
+        self._rest = self._play = resting(self._simulator, self._scene, self._values)
         self._command: ShotCommand | None = None
         self._drawn: NDArray[np.uint8] | None = None
         self._start_ns = self.get_clock().now().nanoseconds
@@ -122,7 +122,7 @@ class VirtualCell(Node):
         self._image_of_play += 1
 
     def _announce(self, now_ns: int) -> None:
-        """Say when the motion begins; after the last still image the cell is free again."""
+        """Say when the motion begins; after the last still image all is put back, and the cell is free again."""
         if self._command is None:
             return
         if self._image_of_play == self._play.begin:
@@ -130,7 +130,7 @@ class VirtualCell(Node):
             shot.names, shot.values = self._command.names, self._command.values
             self._shots.publish(shot)
         if self._image_of_play >= self._play.length:
-            self._command = None
+            self._command, self._play, self._image_of_play = None, self._rest, 0
 
     def _on_reveal(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         names = [parameter.name for parameter in self._cell.parameters]

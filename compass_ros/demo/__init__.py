@@ -1,0 +1,1 @@
+"""The main job on one machine: node processes over DDS, from a shot to a calibrated parameter."""

@@ -1,0 +1,115 @@
+"""What `result.json` says, as a `Result` again: tables and checks can be drawn from it, trajectories cannot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from compass_ros.types import (
+    Budget,
+    EffectFinding,
+    EffectParameter,
+    Evidence,
+    Gap,
+    Graph,
+    Mismatch,
+    ParameterRow,
+    Region,
+    Result,
+    Where,
+)
+
+Json = Mapping[str, Any]
+"""A part of result.json, as `read_result` has checked it."""
+
+
+def from_json(content: Json) -> Result:
+    """The inverse of `to_json`, with NaN for null; replays and trace, which are not in the file, are empty."""
+    gap, graph, budget = content["gap"], content["graph"], content["budget"]
+    return Result(
+        cell=content["cell"],
+        method=content["method"],
+        seed=content["seed"],
+        versions=content["versions"],
+        budget=Budget(budget["rollouts"], _number(budget["simulated_seconds"]), _number(budget["wall_seconds"])),
+        fit=tuple(content["episodes"]["fit"]),
+        held_out=tuple(content["episodes"]["held_out"]),
+        gap={model: _gaps(gap[model]) for model in ("nominal", "calibrated", "with_effects") if gap[model] is not None},
+        noise_floor_m=_number(gap["noise_floor_m"]),
+        parameters=tuple(_parameter(row) for row in content["parameters"]),
+        graph=Graph(
+            tuple(graph["parameters"]),
+            tuple(graph["factors"]),
+            np.array([[_number(p) for p in row] for row in graph["psi"]]).reshape(-1, len(graph["factors"])),
+            graph["threshold"],
+        ),
+        mismatch=_mismatch(content["mismatch"]),
+        trace=(),
+        replays=(),
+        cancelled=content["cancelled"],
+        warnings=tuple(content["warnings"]),
+    )
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else float(value)
+
+
+def _gaps(parts: Json) -> dict[str, Gap]:
+    return {
+        name: Gap({factor: _number(d) for factor, d in part["d"].items()}, _number(part["rmse_m"]))
+        for name, part in parts.items()
+        if part is not None
+    }
+
+
+def _parameter(row: Json) -> ParameterRow:
+    return ParameterRow(
+        name=row["name"],
+        unit=row["unit"],
+        default=_number(row["default"]),
+        value=_number(row["value"]),
+        std=_number(row["std"]),
+        bounds=(_number(row["bounds"][0]), _number(row["bounds"][1])),
+        active=row["active"],
+        identifiable=row["identifiable"],
+    )
+
+
+def _mismatch(said: Json) -> Mismatch:
+    return Mismatch(
+        verdict=said["verdict"],
+        where=None if said["where"] is None else _where(said["where"]),
+        effects=tuple(_effect(effect) for effect in said["effects"]),
+        undetectable=tuple(said["undetectable"]),
+        next_experiment=said["next_experiment"],
+        sentence=said["sentence"],
+    )
+
+
+def _where(where: Json) -> Where:
+    region, time_s = where["region"], where["time_s"]
+    return Where(
+        where["object"],
+        where["phase"],
+        where["channel"],
+        None if region is None else Region((region["centre_m"][0], region["centre_m"][1]), region["radius_m"]),
+        None if time_s is None else (time_s[0], time_s[1]),
+    )
+
+
+def _effect(effect: Json) -> EffectFinding:
+    evidence = effect["evidence"]
+    parameters = {
+        name: EffectParameter(_number(p["value"]), _number(p["std"]), p["unit"])
+        for name, p in effect["parameters"].items()
+    }
+    return EffectFinding(
+        effect["name"],
+        parameters,
+        Evidence(*(_number(evidence[name]) for name in ("held_out_gain", "log_evidence", "false_alarm_p"))),
+        tuple(effect["equivalents"]),
+    )
