@@ -155,7 +155,7 @@ def _fit_circle(residual: Floats, usable: Bools) -> tuple[Floats, Floats, Floats
     solution = np.zeros((len(residual), 3))
     normal = np.tile(prior, (len(residual), 1, 1))
     # Tukey's weights, from forgiving to strict, so that a bad seed costs nothing
-    for scale in (np.inf, 0.006, 0.003, 0.0015, 0.0015):
+    for scale in (np.inf, 0.004, 0.002, 0.001, 0.0008):
         weight = usable * np.clip(1 - (left / scale) ** 2, 0, None) ** 2
         normal = np.einsum("sm,mi,mj->sij", weight, _ROW, _ROW) + prior
         solution = np.linalg.solve(normal, np.einsum("sm,mi,sm->si", weight, _ROW, residual)[..., None])[..., 0]

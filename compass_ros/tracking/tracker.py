@@ -24,6 +24,9 @@ _FULL_SEARCHES = 5
 _RECHECK_EVERY = 8
 _HIDDEN_STD_M = 0.001
 """Standard deviation that a rim hidden as a whole would have; in proportion to the hidden share."""
+_PARTIAL_ARC = 0.7
+_PARTIAL_GATE = 9.2
+"""Squared distance in standard deviations that 99 % of the measurements in the plane keep."""
 _SAME_M = 0.006
 """Measurements of like-coloured discs nearer to each other than this are one."""
 _RESTART_NS = 1_000_000_000
@@ -104,7 +107,7 @@ def step(
     found = assign(_detect(image, fix.view, predicted, last_ns, config), predicted, config)
     motions, sightings = {}, []
     for name in config.objects:
-        sighting = _sight(name, stamp_ns, found.get(name), predicted.get(name), config)
+        sighting = _sight(name, stamp_ns, found.get(name), predicted.get(name), last_ns, config)
         if sighting is not None:
             motions[name], seen = sighting
             sightings.append(seen)
@@ -167,11 +170,25 @@ def _detect(
     return detections
 
 
+def _mistaken(found: Detection, predicted: Motion | None, last_ns: int | None) -> bool:
+    """Whether a disc that is hidden in part was measured at the edge of what hides it: not where it was predicted from
+    the image before. A second such measurement is believed."""
+    if found.arc >= _PARTIAL_ARC or predicted is None or predicted.seen_ns != last_ns:
+        return False
+    off = found.xy - predicted.mean[:2]
+    return bool(off @ np.linalg.solve(predicted.covariance[:2, :2] + found.covariance, off) > _PARTIAL_GATE)
+
+
 def _sight(
-    name: str, stamp_ns: int, found: Detection | None, predicted: Motion | None, config: TrackerConfig
+    name: str,
+    stamp_ns: int,
+    found: Detection | None,
+    predicted: Motion | None,
+    last_ns: int | None,
+    config: TrackerConfig,
 ) -> tuple[Motion, Sighting] | None:
     """The object's next motion and what is said of it; None when it is not known where it is."""
-    if found is not None:
+    if found is not None and not _mistaken(found, predicted, last_ns):
         if predicted is None or np.linalg.norm(found.xy - predicted.mean[:2]) > config.gate_m:
             motion = first_motion(stamp_ns, found.xy, found.covariance)
         else:
