@@ -14,16 +14,14 @@ from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from compass_ros.errors import TrackingError
 from compass_ros.tracking.camera import CameraModel, camera_model
 from compass_ros.tracking.config import TrackerConfig
+from compass_ros.tracking.encoding import bgr_from_bytes
 from compass_ros.tracking.tracker import Sighting
 from compass_ros.types import Floats
 
 FRAME = "table"
 _SECOND_NS = 1_000_000_000
-_CHANNELS = {"bgr8": (0, 1, 2), "rgb8": (2, 1, 0), "bgra8": (0, 1, 2), "rgba8": (2, 1, 0)}
-_DEPTH = {"bgr8": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4}
 _UNKNOWN_YAW_VARIANCE = math.pi**2 / 3
 """A round object shows no yaw: uniform over the circle [rad^2]."""
 
@@ -42,19 +40,8 @@ def header(at_ns: int, frame: str) -> Header:
 
 def image_from_message(message: Image) -> NDArray[np.uint8]:
     """The image as BGR (H, W, 3). Raises TrackingError for an encoding without colour, or a message cut short."""
-    order = _CHANNELS.get(message.encoding)
-    if order is None:
-        raise TrackingError(f"image encoding '{message.encoding}': expected a colour image, one of {sorted(_CHANNELS)}")
-    depth = _DEPTH[message.encoding]
-    data = np.frombuffer(message.data, dtype=np.uint8)
-    if data.size != message.height * message.step or message.step < message.width * depth:
-        raise TrackingError(
-            f"image is cut short: {data.size} bytes for {message.height} rows of {message.step} bytes, "
-            f"{message.width} pixels each"
-        )
-    rows = data.reshape(message.height, message.step)[:, : message.width * depth]
-    pixels = rows.reshape(message.height, message.width, depth)
-    return np.ascontiguousarray(pixels if order == (0, 1, 2) and depth == 3 else pixels[..., order])
+    size = (message.width, message.height)
+    return bgr_from_bytes(memoryview(message.data), size, message.step, message.encoding)
 
 
 def image_message(bgr: NDArray[np.uint8], head: Header) -> Image:
