@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from compass_ros.cells import Cell
-from compass_ros.cells.cell import FactorSpec
+from compass_ros.cells.spec import FactorSpec
 from compass_ros.types import QUANTITY_SIZE, Floats
 
 _ANGLES = {"roll": 0, "pitch": 1, "yaw": 2}

@@ -13,7 +13,7 @@ from mujoco.rollout import Rollout
 
 from compass_ros.cells import Cell
 from compass_ros.cells.dynamics import Dynamics
-from compass_ros.simulation.dynamics import dynamics_of
+from compass_ros.cells.registry import dynamics_of
 from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.effect import Context, Sample
 from compass_ros.simulation.native.program import Kind, Programs, Term

@@ -18,11 +18,12 @@ enum { N_NUMBERS = 8, TABLE = 1 << 16 };
 enum Kind {
   TABLE_FRICTION = 1, UNIFORM = 2, VISCOUS = 3, QUADRATIC = 4, CROSSWIND = 5, FAN = 6, SWIRL = 7, ATTRACTION = 8,
   FRICTION_PATCH = 9, FRICTION_GRADIENT = 10, ANISOTROPIC = 11, STRIBECK = 12, COULOMB = 13, MAGNUS = 14, PULSATING = 15,
-  RATE_RESTITUTION = 16, TANGENTIAL = 17, LIBRARY = 18, HAT = 19,
+  RATE_RESTITUTION = 16, TANGENTIAL = 17, LIBRARY = 18, HAT = 19, TILT = 20,
 };
 
-// What the object is, and so where its forces go.
-enum Object { PLANAR = 0, BODY = 1, JOINT = 2 };
+// What the object is, and so where its forces go: a body that slides along x and y, the same with a hinge about z after
+// them, any other moving body, a joint of its own.
+enum Object { PLANAR = 0, BODY = 1, JOINT = 2, PLANAR_YAW = 3 };
 
 typedef struct {
   int32_t kind, object;   // enum Kind, enum Object
@@ -42,26 +43,43 @@ typedef struct {
 
 typedef void (*ApplyFT)(const mjModel*, mjData*, const mjtNum*, const mjtNum*, const mjtNum*, int, mjtNum*);
 
+// Open addressing. DELETED keeps chains whole; where a chain ends in them, they turn back into empty slots. So a look-up
+// that runs meanwhile for another model always finds it. Writers hold Python's lock.
 static Entry entries[TABLE];
 static int live;
 static ApplyFT apply_ft;
+#define DELETED ((const mjModel*)entries)
 
-static size_t slot_of(const mjModel* model) {
-  size_t slot = ((uintptr_t)model >> 6) * 2654435761u % TABLE;
-  while (entries[slot].model && entries[slot].model != model) slot = (slot + 1) % TABLE;
-  return slot;
+static size_t home_of(const mjModel* model) { return ((uintptr_t)model >> 6) * 2654435761u % TABLE; }
+
+static const Program* find(const mjModel* model) {
+  for (size_t slot = home_of(model); entries[slot].model; slot = (slot + 1) % TABLE)
+    if (entries[slot].model == model) return entries[slot].program;
+  return NULL;
 }
 
 void compass_init(ApplyFT function) { apply_ft = function; }
 
-// Registers a program for a model, or with NULL ends that. A slot stays taken, so that chains stay whole, until no model
-// has a program; then the table is emptied.
-void compass_register(const mjModel* model, const Program* program) {
-  size_t slot = slot_of(model);
-  live += (program != NULL) - (entries[slot].program != NULL);
-  entries[slot].model = model;
+// Gives a model its program. Returns 0 where it has one already, or where three quarters of the table are taken.
+int compass_register(const mjModel* model, const Program* program) {
+  if (find(model) || live >= TABLE / 4 * 3) return 0;
+  size_t slot = home_of(model);
+  while (entries[slot].model && entries[slot].model != DELETED) slot = (slot + 1) % TABLE;
   entries[slot].program = program;
-  if (live == 0) memset(entries, 0, sizeof(entries));
+  entries[slot].model = model;
+  live++;
+  return 1;
+}
+
+// Takes a model's program away; one that has none is left alone.
+void compass_forget(const mjModel* model) {
+  size_t slot = home_of(model);
+  while (entries[slot].model && entries[slot].model != model) slot = (slot + 1) % TABLE;
+  if (!entries[slot].model) return;
+  entries[slot].model = DELETED;
+  live--;
+  if (entries[(slot + 1) % TABLE].model) return;
+  for (; entries[slot].model == DELETED; slot = (slot + TABLE - 1) % TABLE) entries[slot].model = NULL;
 }
 
 // --- forces on one object -----------------------------------------------------------------------------------------------
@@ -107,6 +125,8 @@ static Force evaluate(const Term* term, const State* s) {
     }
     case UNIFORM:          // p: acceleration x, y, z
       return (Force){s->mass * p[0], s->mass * p[1], s->mass * p[2]};
+    case TILT:             // p: slope x, y
+      return (Force){s->weight * p[0], s->weight * p[1], 0};
     case VISCOUS:          // p: rate
       return (Force){-s->mass * p[0] * s->vx, -s->mass * p[0] * s->vy, -s->mass * p[0] * s->vz};
     case QUADRATIC: {      // p: inverse length
@@ -159,37 +179,6 @@ void compass_evaluate(int64_t n, const Term* term, const double* state, double g
   }
 }
 
-static void push(const mjModel* m, mjData* d, const Term* term) {
-  State s = {.time = d->time};
-  const double g = -m->opt.gravity[2];
-  const double* v = d->qvel + term->dof;
-  if (term->object == JOINT) {
-    s.x = d->qpos[m->jnt_qposadr[term->id]];
-    s.vx = v[0];
-    s.mass = 1;             // coefficients of joints are per unit of nothing: torque [N m] directly
-  } else {
-    const double* position = d->xipos + 3 * term->id;
-    s.x = position[0];
-    s.y = position[1];
-    s.mass = m->body_mass[term->id];
-    s.weight = s.mass * g;
-    s.vx = v[0];
-    s.vy = v[1];
-    s.vz = term->object == BODY ? v[2] : 0;   // a free joint's first three velocities are linear, in the world
-  }
-  s.speed = sqrt(s.vx * s.vx + s.vy * s.vy + s.vz * s.vz);
-  Force f = evaluate(term, &s);
-  if (term->object == BODY) {
-    mjtNum force[3] = {f.x, f.y, f.z}, torque[3] = {0, 0, 0};
-    apply_ft(m, d, force, torque, d->xipos + 3 * term->id, term->id, d->qfrc_passive);
-  } else {
-    d->qfrc_passive[term->dof] += f.x;
-    if (term->object == PLANAR) d->qfrc_passive[term->dof + 1] += f.y;
-  }
-}
-
-// --- contacts -----------------------------------------------------------------------------------------------------------
-
 static void body_velocity(const mjModel* m, const mjData* d, int body, const double* at, double out[3]) {
   // velocity of the body's material point `at` [m/s]; cvel is (angular, linear) about the subtree's centre of mass
   const double* w = d->cvel + 6 * body;
@@ -199,6 +188,48 @@ static void body_velocity(const mjModel* m, const mjData* d, int body, const dou
   out[1] = w[4] + w[2] * r[0] - w[0] * r[2];
   out[2] = w[5] + w[0] * r[1] - w[1] * r[0];
 }
+
+static void push(const mjModel* m, mjData* d, const Term* term) {
+  State s = {.time = d->time};
+  const double* v = d->qvel + term->dof;
+  const double* com = d->xipos + (term->object == JOINT ? 0 : 3 * term->id);
+  double arm[2] = {0, 0};   // from the body's origin to its centre of mass
+  if (term->object == JOINT) {
+    s.x = d->qpos[m->jnt_qposadr[term->id]];
+    s.vx = v[0];
+    s.mass = 1;             // coefficients of joints are per unit of nothing: torque [N m] directly
+  } else {
+    s.x = com[0];
+    s.y = com[1];
+    s.mass = m->body_mass[term->id];
+    s.weight = -s.mass * m->opt.gravity[2];
+    if (term->object == BODY) {
+      double velocity[3];
+      body_velocity(m, d, term->id, com, velocity);
+      s.vx = velocity[0];
+      s.vy = velocity[1];
+      s.vz = velocity[2];
+    } else {
+      double rate = term->object == PLANAR_YAW ? v[2] : 0;
+      for (int k = 0; k < 2; k++) arm[k] = com[k] - d->xpos[3 * term->id + k];
+      s.vx = v[0] - rate * arm[1];
+      s.vy = v[1] + rate * arm[0];
+    }
+  }
+  s.speed = sqrt(s.vx * s.vx + s.vy * s.vy + s.vz * s.vz);
+  Force f = evaluate(term, &s);
+  double* passive = d->qfrc_passive + term->dof;
+  if (term->object == BODY) {
+    mjtNum force[3] = {f.x, f.y, f.z}, torque[3] = {0, 0, 0};
+    apply_ft(m, d, force, torque, com, term->id, d->qfrc_passive);
+  } else {
+    passive[0] += f.x;
+    if (term->object != JOINT) passive[1] += f.y;
+    if (term->object == PLANAR_YAW) passive[2] += arm[0] * f.y - arm[1] * f.x;
+  }
+}
+
+// --- contacts -----------------------------------------------------------------------------------------------------------
 
 // Velocity of the contact's second body against its first: tangential part in v, returns the part along the normal.
 static double contact_velocity(const mjModel* m, const mjData* d, const mjContact* c, double v[3]) {
@@ -248,7 +279,7 @@ static void tangential_impulse(const mjModel* m, mjData* d, const Term* term) {
 // --- what MuJoCo calls --------------------------------------------------------------------------------------------------
 
 void compass_passive(const mjModel* m, mjData* d) {
-  const Program* program = entries[slot_of(m)].program;
+  const Program* program = find(m);
   if (!program) return;
   for (int64_t i = 0; i < program->n; i++) {
     const Term* term = program->term + i;

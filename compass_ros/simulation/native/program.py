@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import cache
 from pathlib import Path
@@ -12,6 +12,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from compass_ros.errors import ConfigError, nearest
 from compass_ros.types import Floats
 
 NUMBERS = 8
@@ -41,14 +42,16 @@ class Kind(IntEnum):
     TANGENTIAL = 17
     LIBRARY = 18
     HAT = 19
+    TILT = 20
 
 
 class Placement(IntEnum):
-    """Where a force goes: two sliding joints in the plane, a free body, or a joint of its own."""
+    """Where a force goes: joints that slide along x and y (and turn about z), any moving body, or a joint of its own."""
 
     PLANAR = 0
     BODY = 1
     JOINT = 2
+    PLANAR_YAW = 3
 
 
 @dataclass(frozen=True)
@@ -62,38 +65,46 @@ class Term:
     """(B, up to NUMBERS) in the order that fields.c documents for the kind."""
 
 
-@dataclass(frozen=True)
 class Programs:
-    """The programs of a batch, registered while the context is open. Keeps the memory that C reads alive."""
+    """The programs of a batch of models that are alike, registered while the context is open.
 
-    models: Sequence[mujoco.MjModel]
-    terms: Sequence[Term]
-    _memory: list[np.ndarray] = field(default_factory=list)
+    Keeps the memory that C reads alive. Raises ConfigError where an object of a term is no moving body or joint of the
+    models, or where a model has a program already.
+    """
+
+    def __init__(self, models: Sequence[mujoco.MjModel], terms: Sequence[Term]) -> None:
+        self._models = list(models) if terms else []
+        self._block = np.zeros((len(models), len(terms)), _TERM)
+        for i, term in enumerate(terms):
+            row = self._block[:, i]
+            row["kind"] = term.kind
+            if term.object:
+                row["object"], row["id"], row["dof"] = _place(models[0], term.object)
+            row["number"][:, : term.numbers.shape[1]] = term.numbers
+        self._programs = np.zeros(len(models), _PROGRAM)
+        self._programs["n"] = len(terms)
+        self._programs["term"] = self._block.ctypes.data + self._block.strides[0] * np.arange(len(models))
 
     def __enter__(self) -> Programs:
         library = _library()
-        if not self.terms:
-            return self
-        block = np.zeros((len(self.models), len(self.terms)), _TERM)
-        for i, term in enumerate(self.terms):
-            block["kind"][:, i] = term.kind
-            if term.object:
-                placement, identity, dof = _place(self.models[0], term.object)
-                block["object"][:, i], block["id"][:, i], block["dof"][:, i] = placement, identity, dof
-            block["number"][:, i, : term.numbers.shape[1]] = term.numbers
-        programs = np.zeros(len(self.models), _PROGRAM)
-        programs["n"] = len(self.terms)
-        programs["term"] = block.ctypes.data + block.strides[0] * np.arange(len(self.models))
-        self._memory.extend((block, programs))
-        for b, model in enumerate(self.models):
-            library.compass_register(model._address, programs.ctypes.data + b * programs.strides[0])
+        at, stride = self._programs.ctypes.data, self._programs.strides[0]
+        for b, model in enumerate(self._models):
+            if not library.compass_register(model._address, at + b * stride):
+                self._forget(self._models[:b])
+                raise ConfigError(
+                    "forces cannot be attached: the model has forces already (detach those first), "
+                    "or too many models have some"
+                )
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._forget(self._models)
+
+    @staticmethod
+    def _forget(models: Sequence[mujoco.MjModel]) -> None:
         library = _library()
-        for model in self.models:
-            library.compass_register(model._address, None)
-        self._memory.clear()
+        for model in models:
+            library.compass_forget(model._address)
 
 
 def evaluate(term: Term, states: Floats, gravity: float) -> Floats:
@@ -111,29 +122,49 @@ def evaluate(term: Term, states: Floats, gravity: float) -> Floats:
 
 
 def _place(model: mujoco.MjModel, name: str) -> tuple[Placement, int, int]:
-    """How the forces on a body (or joint) of that name reach the model's degrees of freedom."""
-    joint_id = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
-    if joint_id >= 0:
-        return Placement.JOINT, joint_id, int(model.jnt_dofadr[joint_id])
-    body = model.body(name)
-    dof = int(body.dofadr[0])
-    kinds = model.jnt_type[body.jntadr[0] : body.jntadr[0] + body.jntnum[0]].tolist()
-    planar = kinds[:2] == [mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_SLIDE]
-    return Placement.PLANAR if planar else Placement.BODY, int(body.id), dof
+    """How the forces on a body (or joint) of that name reach the model's degrees of freedom, its id, the first of them."""
+    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+    if joint >= 0:
+        return Placement.JOINT, joint, int(model.jnt_dofadr[joint])
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+    if body < 0 or not model.body_weldid[body]:
+        moving = [model.body(i).name for i in range(1, model.nbody) if model.body_weldid[i]]
+        raise ConfigError(f"the scene has no moving body or joint '{name}'; it moves {moving}{nearest(name, moving)}")
+    return _joints_of(model, body), body, int(model.body_dofadr[body])
+
+
+def _joints_of(model: mujoco.MjModel, body: int) -> Placement:
+    """PLANAR or PLANAR_YAW for a body of the world that slides along x and y; BODY for anything else that moves."""
+    count = int(model.body_jntnum[body])
+    own = slice(model.body_jntadr[body], model.body_jntadr[body] + count)
+    planar = [mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE]
+    if (
+        count in (2, 3)
+        and model.body_parentid[body] == 0
+        and model.jnt_type[own].tolist() == planar[:count]
+        and np.array_equal(model.jnt_axis[own], np.eye(3)[:count])
+        and np.array_equal(model.body_quat[body], [1, 0, 0, 0])
+        and not model.jnt_pos[own].any()
+    ):
+        return Placement.PLANAR if count == 2 else Placement.PLANAR_YAW
+    return Placement.BODY
 
 
 @cache
-def _library() -> ctypes.CDLL:
+def _library() -> ctypes.PyDLL:
     """Load the compiled forces and install the callback, once a process. Models without a program do not notice it."""
     folder = Path(__file__).parent
     (path,) = folder.glob("_fields*.so")
-    library = ctypes.CDLL(str(path))
+    library = ctypes.PyDLL(str(path))  # keeps Python's lock: registering is not made for two threads at once
     core = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco.so*"))))
     library.compass_register.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
-    library.compass_register.restype = None
+    library.compass_register.restype = ctypes.c_int
+    library.compass_forget.argtypes = [ctypes.c_void_p]
+    library.compass_forget.restype = None
     library.compass_evaluate.argtypes = [ctypes.c_int64, *2 * [ctypes.c_void_p], ctypes.c_double, ctypes.c_void_p]
     library.compass_evaluate.restype = None
     library.compass_init.argtypes = [ctypes.c_void_p]
+    library.compass_init.restype = None
     library.compass_init(ctypes.cast(core.mj_applyFT, ctypes.c_void_p))
     callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
     mujoco.set_mjcb_passive(ctypes.cast(library.compass_passive, callback))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from compass_ros.cells import Cell
 from compass_ros.cells.air_hockey import AirHockey
+from compass_ros.cells.cell import Cell
 from compass_ros.cells.dynamics import Dynamics
 from compass_ros.errors import ConfigError, nearest
 

@@ -1,0 +1,42 @@
+"""From a name or a path to a cell that can be simulated."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from compass_ros.cells.cell import Cell
+from compass_ros.cells.registry import dynamics_of
+from compass_ros.cells.spec import validated_spec
+from compass_ros.config import read_yaml
+from compass_ros.errors import ConfigError, nearest
+
+_builtin = Path(__file__).parents[1] / "config" / "cells"
+
+
+def load(name_or_path: str | Path) -> Cell:
+    """A cell by its name in config/cells or by the path of its YAML.
+
+    Raises ConfigError with one line: no such cell, not as expected, or with a scene or parameters that its dynamics
+    cannot use.
+    """
+    path = Path(name_or_path)
+    if path.suffix not in (".yaml", ".yml"):
+        known = sorted(p.stem for p in cells_folder().glob("*.yaml"))
+        if str(name_or_path) not in known:
+            raise ConfigError(
+                f"unknown cell '{name_or_path}'; known: {', '.join(known)}{nearest(str(name_or_path), known)}"
+            )
+        path = cells_folder() / f"{name_or_path}.yaml"
+    spec = validated_spec(read_yaml(path), str(path))
+    model = path.parent / spec.model
+    if not model.is_file():
+        raise ConfigError(f"{path}: model: no file {model}")
+    cell = Cell(spec, path, hashlib.sha256(path.read_bytes() + model.read_bytes()).hexdigest()[:16])
+    dynamics_of(cell)
+    return cell
+
+
+def cells_folder() -> Path:
+    """Folder of the cells that come with the suite: installed inside the package, or at the root of a checkout."""
+    return _builtin if _builtin.is_dir() else Path(__file__).parents[2] / "config" / "cells"

@@ -1,0 +1,147 @@
+"""A cell's YAML, field by field."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Literal
+
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass as validated
+
+from compass_ros.cells.start import ReleaseSpec, StartSpec
+from compass_ros.errors import ConfigError, nearest
+from compass_ros.types import Quantity
+
+_strict = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+@validated(frozen=True, config=_strict, kw_only=True)
+class ObjectSpec:
+    """A tracked object."""
+
+    name: str
+    quantity: Quantity
+    topic: str = ""
+    body: str = ""
+    """Body (quantity `joint`: joint) of the scene; the object's own name where empty."""
+
+
+@validated(frozen=True, config=_strict, kw_only=True)
+class FactorSpec:
+    """One of the K parts of the state whose trajectory difference is measured."""
+
+    name: str
+    object: str
+    part: Literal["all", "position", "orientation", "roll", "pitch", "yaw"] = "all"
+    """Which numbers of the object's row."""
+
+
+@validated(frozen=True, config=_strict, kw_only=True)
+class ActionSpec:
+    name: str
+    unit: str
+    low: float
+    high: float
+    reach: tuple[float, float] | None = None
+    """What the robot could do, where that is more than the action space; `compass plan` looks there."""
+    description: str = ""
+    field: str = ""
+    """Cells without code: what it sets, `qpos[0]` or `qvel[0]` of a joint at the start, or `ctrl` of an actuator."""
+    of: str = ""
+    """Name of that joint or actuator."""
+    from_s: float = Field(0.0, ge=0)
+    """When a `ctrl` begins."""
+    until_s: float = Field(math.inf, gt=0)
+    """When it is 0 again."""
+
+
+@validated(frozen=True, config=_strict, kw_only=True)
+class ParameterSpec:
+    name: str
+    default: float
+    bounds: tuple[float, float]
+    unit: str
+    half_width: float = Field(gt=0)
+    target: float | None = None
+    """Value in the "real" simulator of the paper's sim-to-sim experiment."""
+    description: str = ""
+    field: str = ""
+    """Where the cell has no code of its own: field of mjModel, with its index as in `geom_friction[0]`."""
+    of: str = ""
+    """Name of the element whose field it is."""
+
+
+@validated(frozen=True, config=_strict, kw_only=True)
+class CellSpec:
+    """The YAML, field by field."""
+
+    name: str
+    dynamics: str
+    model: str
+    control_dt_s: float = Field(gt=0)
+    horizon: int = Field(ge=1)
+    objects: tuple[ObjectSpec, ...]
+    factors: tuple[str | FactorSpec, ...]
+    parameters: tuple[ParameterSpec, ...]
+    action: tuple[ActionSpec, ...] = ()
+    noise_m: float = Field(0.001, gt=0)
+    launch_noise: Mapping[str, float] = Field(default_factory=dict)
+    start: tuple[StartSpec, ...] = ()
+    """First states that an episode brings with it."""
+    release: ReleaseSpec | None = None
+    """When the motion begins, where that differs from episode to episode."""
+    auto: bool = False
+    """Cells without code: every other tunable field of the scene becomes a parameter too."""
+    causal: tuple[str, ...] = ()
+    """Parameters that the paper found to be causes; used by benchmarks only."""
+
+
+def validated_spec(content: Mapping[str, object], where: str) -> CellSpec:
+    """Check a YAML's content. Raises ConfigError that names the field, what was found, and the nearest known name."""
+    try:
+        spec = TypeAdapter(CellSpec).validate_python(dict(content))
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = ".".join(str(part) for part in first["loc"])
+        known = [f.name for spec in (CellSpec, ParameterSpec, ActionSpec, ObjectSpec, FactorSpec) for f in fields(spec)]
+        hint = nearest(name.rsplit(".", 1)[-1], known) if first["type"] == "unexpected_keyword_argument" else ""
+        raise ConfigError(f"{where}: {name}: {first['msg']}, found {str(first['input'])[:80]!r}{hint}") from error
+    _check_values(spec, where)
+    _check_names(spec, where)
+    return spec
+
+
+def _check_values(spec: CellSpec, where: str) -> None:
+    """Defaults and targets inside bounds, intervals the right way round."""
+    for p in spec.parameters:
+        for what, value in (("default", p.default), ("target", p.target)):
+            if value is not None and not p.bounds[0] <= value <= p.bounds[1]:
+                raise ConfigError(f"{where}: {p.name}: {what} {value:g} is outside its bounds {list(p.bounds)}")
+    for a in spec.action:
+        if not a.low < a.high:
+            raise ConfigError(f"{where}: action {a.name}: expected low < high, found {a.low:g} and {a.high:g}")
+        if a.reach and not (a.reach[0] <= a.low and a.high <= a.reach[1]):
+            raise ConfigError(f"{where}: action {a.name}: reach {list(a.reach)} does not hold [{a.low:g}, {a.high:g}]")
+
+
+def _check_names(spec: CellSpec, where: str) -> None:
+    """Names stand once, and what refers to a name finds it."""
+    parameters, objects = [p.name for p in spec.parameters], {o.name: o for o in spec.objects}
+    actions, factors = [a.name for a in spec.action], [f if isinstance(f, str) else f.name for f in spec.factors]
+    everything = {"parameters": parameters, "objects": [o.name for o in spec.objects], "action": actions}
+    for section, names in (everything | {"factors": factors}).items():
+        twice = sorted({n for n in names if names.count(n) > 1})
+        if twice:
+            raise ConfigError(f"{where}: {section}: {', '.join(twice)} stands twice")
+    for f in spec.factors:
+        name = f if isinstance(f, str) else f.object
+        if name not in objects:
+            raise ConfigError(f"{where}: factors: unknown object '{name}'; known: {[*objects]}{nearest(name, objects)}")
+        if not isinstance(f, str) and f.part not in ("all", "position") and objects[name].quantity != "pose":
+            raise ConfigError(f"{where}: factors: {f.name}: '{name}' is tracked as {objects[name].quantity}, without {f.part}")
+    for section, given, known in (("causal", spec.causal, parameters), ("launch_noise", spec.launch_noise, actions)):
+        for name in given:
+            if name not in known:
+                raise ConfigError(f"{where}: {section}: unknown name '{name}'{nearest(name, known)}")

@@ -1,0 +1,129 @@
+"""How an episode begins, where no shot command says it: the first state of each object, measured or left free.
+
+Each number of a first state is an input of the cell beside the action's fields. Its standard deviation is what the fit may
+move it by, in each episode anew; 0 keeps it as it was measured. An orientation is moved by a small rotation vector.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as validated
+from scipy.spatial.transform import Rotation
+
+from compass_ros.errors import DataError
+from compass_ros.types import Episode, Floats, Quantity, Track
+
+STATE: Mapping[Quantity, tuple[str, ...]] = {
+    "joint": ("angle", "rate"),
+    "xy": ("x", "y", "vx", "vy"),
+    "xyz": ("x", "y", "z", "vx", "vy", "vz"),
+    "pose": ("x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"),
+}
+"""Numbers of a first state [m, m/s, rad, rad/s]; w: angular velocity in the body's frame, as MuJoCo has it."""
+TURN = ("rx", "ry", "rz")
+"""Rotation vector [rad] in the body's frame, after the first orientation of a pose; 0 as measured."""
+_GROUPS: Mapping[str, tuple[str, ...]] = {
+    "position": ("x", "y", "z", "angle"),
+    "velocity": ("vx", "vy", "vz", "rate"),
+    "orientation": TURN,
+    "rate": ("wx", "wy", "wz"),
+}
+_NS = 1e-9
+Deviation = Annotated[float, Field(ge=0)]
+
+
+@validated(frozen=True, config=ConfigDict(extra="forbid"), kw_only=True)
+class StartSpec:
+    """Where the first state of an object comes from, and how far it may be wrong."""
+
+    object: str
+    velocity: Literal["track", "rest"] = "track"
+    """Where the recording states no first velocity: from the first frames of the track, or zero."""
+    frames: int = Field(5, ge=2)
+    """Frames of the track from which a first velocity is taken."""
+    noise: Mapping[Literal["position", "velocity", "orientation", "rate"], Deviation] = Field(default_factory=dict)
+    """Standard deviation of the first position [m or rad], velocity [m/s or rad/s], orientation [rad], rate [rad/s]."""
+
+
+@validated(frozen=True, config=ConfigDict(extra="forbid"), kw_only=True)
+class ReleaseSpec:
+    """When the motion begins, after the start of the recording; until then everything stands as it starts."""
+
+    default_s: float = 0.0
+    noise_s: Deviation = 0.0
+
+
+def input_names(spec: StartSpec, quantity: Quantity) -> tuple[str, ...]:
+    """Names of an object's inputs: its state, then the rotation vector of a pose."""
+    return tuple(f"{spec.object}.{name}" for name in _names(quantity))
+
+
+def input_std(spec: StartSpec, quantity: Quantity) -> tuple[float, ...]:
+    """Standard deviation of each of these inputs."""
+    of_name = {name: spec.noise.get(group, 0.0) for group, names in _GROUPS.items() for name in names}  # type: ignore[call-overload]
+    return tuple(float(of_name.get(name, 0.0)) for name in _names(quantity))
+
+
+def _names(quantity: Quantity) -> tuple[str, ...]:
+    return STATE[quantity] + (TURN if quantity == "pose" else ())
+
+
+def first_state(spec: StartSpec, quantity: Quantity, episode: Episode) -> Floats:
+    """The inputs of an object at the start of an episode.
+
+    What the recording states as initial state goes first; what it leaves out comes from the track. Raises DataError.
+    """
+    stated = np.array(episode.initial_state.get(spec.object, ()), float)
+    size = len(STATE[quantity])
+    moving = size - {"joint": 1, "xy": 2, "xyz": 3, "pose": 6}[quantity]
+    if len(stated) not in (0, moving, size):
+        raise DataError(
+            f"{episode.source or episode.name}: initial state of {spec.object}: expected {moving} or {size} numbers "
+            f"({', '.join(STATE[quantity])}), found {len(stated)}"
+        )
+    state = stated if len(stated) == size else _from_track(spec, quantity, episode, stated)
+    if quantity == "pose":
+        state[3:7] = _unit(state[3:7], spec, episode)
+    return np.concatenate([state, np.zeros(len(TURN) if quantity == "pose" else 0)])
+
+
+def _unit(quaternion: Floats, spec: StartSpec, episode: Episode) -> Floats:
+    """Of length one, with a positive scalar part."""
+    length = float(np.linalg.norm(quaternion))
+    if length < 1e-6:
+        raise DataError(f"{episode.source or episode.name}: initial state of {spec.object}: no orientation in {quaternion}")
+    return np.asarray(quaternion / (length if quaternion[0] >= 0 else -length))
+
+
+def _from_track(spec: StartSpec, quantity: Quantity, episode: Episode, stated: Floats) -> Floats:
+    """First state from the first frames: the line through them, or the parabola where there are at least five."""
+    known = {track.object: track for track in episode.tracks}
+    if spec.object not in known:
+        raise DataError(f"{episode.source or episode.name}: no initial state and no track of {spec.object}")
+    track: Track = known[spec.object]
+    after = np.flatnonzero(track.stamp_ns >= episode.start_ns)[: spec.frames]
+    if len(after) < 2:
+        raise DataError(f"{episode.source or episode.name}: fewer than 2 frames of {spec.object} after the start")
+    time = (track.stamp_ns[after] - episode.start_ns) * _NS
+    value = track.value[after]
+    linear = value[:, :3] if quantity == "pose" else value
+    fit = np.polynomial.polynomial.polyfit(time, linear, 2 if len(after) >= 5 else 1)
+    at_rest = spec.velocity == "rest"
+    position = stated if len(stated) else np.concatenate([linear[0] if at_rest else fit[0], value[0, linear.shape[1] :]])
+    velocity = np.zeros(linear.shape[1]) if at_rest else fit[1]
+    rate = np.zeros(0)
+    if quantity == "pose":
+        rate = np.zeros(3) if at_rest else _angular_velocity(time, value[:, 3:])
+    return np.concatenate([position, velocity, rate])
+
+
+def _angular_velocity(time: Floats, quaternion: Floats) -> Floats:
+    """(3,) rate in the body's frame [rad/s] by least squares over the rotation from the first frame."""
+    rotation = Rotation.from_quat(quaternion[:, [1, 2, 3, 0]])
+    turned = (rotation[0].inv() * rotation).as_rotvec()
+    since = time - time[0]
+    return np.asarray(since @ turned / np.sum(since**2))
