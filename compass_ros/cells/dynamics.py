@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -33,7 +33,7 @@ class Dynamics(Protocol):
         ...
 
     def apply(self, models: Sequence[mujoco.MjModel], values: Floats) -> None:
-        """Write (B, P) parameter values into B models."""
+        """Write (B, P) parameter values into B models. What MuJoCo derives from them (mj_setConst) is the caller's."""
         ...
 
     def start(self, values: Floats, inputs: Floats) -> tuple[Floats, Floats]:
@@ -49,9 +49,16 @@ class Dynamics(Protocol):
         ...
 
     def columns(self) -> Ints:
-        """(C,) index into qpos of each observed column."""
+        """(C,) places of the observed columns in a row of (qpos, qvel, act, sensordata)."""
         ...
 
     def observe(self, values: Floats, positions: Floats) -> Floats:
-        """(B, F, C) what the tracker would say, from (B, F, C) raw columns of qpos."""
+        """(B, F, C) what the tracker would say, from (B, F, C) raw columns."""
+        ...
+
+    def poses(self, values: Floats, positions: Floats) -> Mapping[str, Floats]:
+        """(B, F, 3) x, y [m] and yaw [rad] of each body that moves in the plane, in the tracker's frame, for drawings.
+
+        From (B, F, nq) positions; empty for cells that are not planar.
+        """
         ...

@@ -10,7 +10,7 @@ import numpy as np
 
 from compass_ros.cells import Cell
 from compass_ros.cells.registry import dynamics_of
-from compass_ros.simulation.effects.attached import FittedEffect, write_effects
+from compass_ros.simulation.effects import FittedEffect, write_effects
 from compass_ros.simulation.simulator import Simulator
 from compass_ros.types import Floats
 

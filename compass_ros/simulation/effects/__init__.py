@@ -1,31 +1,21 @@
 """Physics that a simulator may lack, each effect a file of this folder; EFFECTS knows them by name."""
 
-from __future__ import annotations
-
-from importlib import import_module
-from types import MappingProxyType
-
-from compass_ros.errors import ConfigError, nearest
-from compass_ros.simulation.effects.attached import Attached, attach, read_effects, write_effects
+from compass_ros.simulation.effects.attach import Attachment, attach
+from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.effect import Effect, Quantity
+from compass_ros.simulation.effects.exported import Exported, FittedEffect, read_effects, write_effects
+from compass_ros.simulation.effects.registry import EFFECTS, effect
 
-_NAMES = (
-    *("table_tilt", "viscous_drag", "quadratic_drag", "crosswind", "fan_field", "swirl", "point_attraction"),
-    *("friction_patch", "friction_gradient", "anisotropic_friction", "stribeck_friction", "coulomb_friction"),
-    *("magnus", "pulsating_lift"),
-    *("rate_dependent_restitution", "tangential_impulse", "local_wall", "off_centre_mass", "friction_cone"),
-    *("actuation_delay", "first_order_lag", "velocity_saturation", "dead_band", "heading_bias", "stroke_jitter"),
-    *("camera_latency", "camera_scale", "camera_rotation", "lens_distortion", "rolling_shutter", "tracking_lag"),
-    "clock_drift",
-)
-EFFECTS = MappingProxyType({name: import_module(f"{__name__}.{name}").EFFECT for name in _NAMES})
-
-
-def effect(name: str) -> Effect:
-    """The effect of that name. Raises ConfigError with the nearest known one."""
-    if name not in EFFECTS:
-        raise ConfigError(f"unknown effect '{name}'; known: {', '.join(EFFECTS)}{nearest(name, EFFECTS)}")
-    return EFFECTS[name]
-
-
-__all__ = ["EFFECTS", "Attached", "Effect", "Quantity", "attach", "effect", "read_effects", "write_effects"]
+__all__ = [
+    "EFFECTS",
+    "Attached",
+    "Attachment",
+    "Effect",
+    "Exported",
+    "FittedEffect",
+    "Quantity",
+    "attach",
+    "effect",
+    "read_effects",
+    "write_effects",
+]

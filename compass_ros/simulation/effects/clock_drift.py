@@ -13,11 +13,16 @@ def _sensing(sample: Sample, numbers: Floats, context: Context) -> Sample:
     return lambda time: sample(time * (1 + numbers[:, :1]))
 
 
+def _ahead(numbers: Floats, last: float) -> float:
+    return last * max(float(numbers.max()), 0.0)
+
+
 EFFECT = Effect(
     name="clock_drift",
     channel="sensing",
     quantities=(Quantity("rate", "1", -0.1, 0.1, 0.005),),
     sentence="a drift of the sensor's clock",
     sensing=_sensing,
+    ahead=_ahead,
     on="cell",
 )

@@ -17,7 +17,7 @@ def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
     terms = []
     for name in context.objects:
         if name in context.sliding:
-            creep, load = creep_and_load(context.sliding[name])
+            creep, load = creep_and_load(context, name)
         else:  # a joint, or a body off the table: the friction is a torque [N m], faded in at 1 mrad/s (1 mm/s)
             creep, load = np.full((len(numbers), 1), 1e-3), np.ones((len(numbers), 1))
         terms.append(Term(Kind.COULOMB, name, np.hstack([numbers, creep, load])))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import mujoco
 
 from compass_ros.cells.dynamics import Sliding
+from compass_ros.errors import ConfigError
 from compass_ros.simulation.native.program import Term
 from compass_ros.types import Channel, Floats
 
@@ -55,14 +57,33 @@ class Effect:
     """What the simulator lacks, as in 'the simulator lacks ...'."""
     forces: Callable[[Floats, Context], tuple[Term, ...]] | None = None
     model: Callable[[mujoco.MjModel, Floats, Context], None] | None = None
-    """Changes one model, given (q,) numbers; what it changes must be among RESTORED in simulator.py."""
+    """Changes one model, given (q,) numbers; what it changes must be among RESTORED."""
     controls: Callable[[Floats, Floats, Context], Floats] | None = None
     """(B, T, nu) velocity commands -> the same as the arm follows them."""
     sensing: Callable[[Sample, Floats, Context], Sample] | None = None
-    on: str = "objects"
+    ahead: Callable[[Floats, float], float] | None = None
+    """(B, q) numbers, last time asked for [s] -> how far beyond it the sensor looks [s]; None: not at all."""
+    on: Literal["objects", "walls", "cell"] = "objects"
     """What it acts on: `objects` (all that are tracked, or some), `walls` (one fixed geom of the scene), `cell`."""
 
 
-def creep_and_load(sliding: Sliding) -> tuple[Floats, Floats]:
-    """The two columns that every friction force needs: creep speed [m/s] and share of the weight on the table."""
+RESTORED = ("geom_pos", "geom_quat", "geom_sameframe", "geom_solref", "body_ipos", "body_sameframe", "pair_solref")
+"""Arrays of a model that effects may change, beside the friction cone in its options."""
+
+
+def restore(model: mujoco.MjModel, scene: mujoco.MjModel) -> None:
+    """Undo in `model` what effects have changed since it was a copy of `scene`."""
+    model.opt.cone = scene.opt.cone
+    for name in RESTORED:
+        getattr(model, name)[:] = getattr(scene, name)
+
+
+def creep_and_load(context: Context, name: str) -> tuple[Floats, Floats]:
+    """The two columns that friction on the table needs: creep speed [m/s] and share of the weight on the table.
+
+    Raises ConfigError where the object does not lie on the table.
+    """
+    if name not in context.sliding:
+        raise ConfigError(f"friction on the table cannot act on '{name}'; on the table lie {sorted(context.sliding)}")
+    sliding = context.sliding[name]
     return sliding.creep[:, None], sliding.load[:, None]

@@ -1,7 +1,7 @@
 """One wall that stands elsewhere or is softer than the others.
 
-The geom moves by `offset` along its outward normal (a box: along its thinner side); the stiffness of its contacts is
-multiplied by exp(softness). Source: geometry and the direct solref format of MuJoCo.
+The geom moves by `offset`, a wall away from the table, a bar along its thinner side (against its own axis); the stiffness
+of its contacts, k, turns into k exp(softness). Source: geometry and the direct solref format of MuJoCo.
 """
 
 from __future__ import annotations
@@ -18,8 +18,10 @@ def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
     geom = model.geom(context.objects[0]).id
     axes = np.zeros(9)
     mujoco.mju_quat2Mat(axes, model.geom_quat[geom])
-    normal = axes.reshape(3, 3)[:, 2 if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE else 0]
-    model.geom_pos[geom] -= offset * normal
+    plane = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
+    inwards = axes.reshape(3, 3)[:, 2 if plane else int(np.argmin(model.geom_size[geom, :2]))]
+    model.geom_pos[geom] -= offset * inwards
+    model.geom_sameframe[geom] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     pairs = (model.pair_geom1 == geom) | (model.pair_geom2 == geom)
     model.pair_solref[pairs, 0] *= np.exp(softness)
 

@@ -7,13 +7,21 @@ from __future__ import annotations
 
 import mujoco
 
+from compass_ros.errors import ConfigError
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.types import Floats
 
 
 def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
     for name in context.objects:
-        model.body_ipos[model.body(name).id, :2] += numbers
+        body = model.body(name).id
+        if model.body_simple[body] and numbers.any():
+            raise ConfigError(
+                f"off_centre_mass cannot act on '{name}': MuJoCo has compiled it as centred for good; "
+                "give it an <inertial> some micrometres off the centre"
+            )
+        model.body_ipos[body, :2] += numbers
+        model.body_sameframe[body] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
 
 
 EFFECT = Effect(

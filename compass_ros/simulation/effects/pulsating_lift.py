@@ -16,7 +16,7 @@ from compass_ros.types import Floats
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
     terms = []
     for name in context.objects:
-        creep, load = creep_and_load(context.sliding[name])
+        creep, load = creep_and_load(context, name)
         terms.append(Term(Kind.PULSATING, name, np.hstack([numbers[:, :2], creep, load, numbers[:, 2:]])))
     return tuple(terms)
 

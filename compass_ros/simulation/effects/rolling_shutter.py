@@ -6,6 +6,8 @@ whose rows lie along the table; 0.225 m is half the width that the image covers.
 
 from __future__ import annotations
 
+import numpy as np
+
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity, Sample
 from compass_ros.types import Floats
 
@@ -23,11 +25,16 @@ def _sensing(sample: Sample, numbers: Floats, context: Context) -> Sample:
     return shuttered
 
 
+def _ahead(numbers: Floats, last: float) -> float:
+    return 2.0 * float(np.abs(numbers).max())  # positions stay within twice the half width, biases included
+
+
 EFFECT = Effect(
     name="rolling_shutter",
     channel="sensing",
     quantities=(Quantity("time", "s", -0.05, 0.05, 0.003),),
     sentence="a rolling shutter",
     sensing=_sensing,
+    ahead=_ahead,
     on="cell",
 )

@@ -12,7 +12,7 @@ from compass_ros.types import Floats
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    return tuple(Term(Kind.UNIFORM, name, 9.81 * numbers) for name in context.objects)
+    return tuple(Term(Kind.TILT, name, numbers) for name in context.objects)
 
 
 EFFECT = Effect(

@@ -7,17 +7,19 @@ Source: exponential filter; Gauss-Laguerre nodes, exact for polynomials up to de
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import roots_laguerre
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity, Sample
 from compass_ros.types import Floats
 
-_NODES, _WEIGHTS = np.polynomial.laguerre.laggauss(6)
+_NODES, _WEIGHTS = roots_laguerre(6)
 
 
 def _sensing(sample: Sample, numbers: Floats, context: Context) -> Sample:
     def lagged(time: Floats) -> Floats:
-        parts = [w * sample(time - numbers[:, :1] * node) for node, w in zip(_NODES, _WEIGHTS, strict=True)]
-        return np.asarray(np.sum(parts, axis=0))
+        now = sample(time)
+        behind = [w * (sample(time - numbers[:, :1] * node) - now) for node, w in zip(_NODES, _WEIGHTS, strict=True)]
+        return np.asarray(now + np.sum(behind, axis=0))
 
     return lagged
 

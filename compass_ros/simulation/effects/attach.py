@@ -1,0 +1,69 @@
+"""Exported effects on any MuJoCo model."""
+
+from __future__ import annotations
+
+import copy
+import weakref
+
+import mujoco
+import numpy as np
+
+from compass_ros.errors import ConfigError
+from compass_ros.simulation.effects.effect import Context, restore
+from compass_ros.simulation.effects.exported import Exported
+from compass_ros.simulation.native.program import Kind, Programs, Term
+
+
+class Attachment:
+    """Effects that act on a model until `detach`, the end of a `with` block, or the end of this object."""
+
+    def __init__(self, model: mujoco.MjModel, programs: Programs) -> None:
+        self._end = weakref.finalize(self, _end, model, copy.copy(model), programs)
+        programs.__enter__()
+
+    def detach(self) -> None:
+        """Stop the forces and undo the changes of the model. A second call does nothing."""
+        self._end()
+
+    def __enter__(self) -> Attachment:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.detach()
+
+
+def attach(model: mujoco.MjModel, data: mujoco.MjData, exported: Exported) -> Attachment:
+    """Let exported effects, and the table's friction that comes with them, act on a model from now on.
+
+    Keep what is returned as long as the model is stepped. Raises ConfigError for effects of the command or of the sensor,
+    which act outside the model, where the model lacks an object, and where it has effects attached already.
+    """
+    terms = [
+        Term(Kind.TABLE_FRICTION, s.body, np.stack([s.friction, s.creep, s.load], axis=1))
+        for s in exported.sliding.values()
+    ]
+    for fitted in exported.effects:
+        kind = fitted.attached.effect
+        if kind.model is None and kind.forces is None:
+            raise ConfigError(f"effect '{kind.name}' belongs to the {kind.channel}, outside the model; apply it there")
+        fitted.attached.check(model)
+        if kind.forces is not None:
+            terms.extend(kind.forces(np.array([fitted.values]), _context(model, exported, fitted.attached.objects)))
+    attachment = Attachment(model, Programs([model], terms))
+    for fitted in exported.effects:
+        if fitted.attached.effect.model is not None:
+            context = _context(model, exported, fitted.attached.objects)
+            fitted.attached.effect.model(model, np.array(fitted.values), context)
+    mujoco.mj_setConst(model, copy.copy(data))
+    mujoco.mj_forward(model, data)
+    return attachment
+
+
+def _context(model: mujoco.MjModel, exported: Exported, objects: tuple[str, ...]) -> Context:
+    return Context(objects, exported.sliding, (), (), float(model.opt.timestep))
+
+
+def _end(model: mujoco.MjModel, before: mujoco.MjModel, programs: Programs) -> None:
+    programs.__exit__()
+    restore(model, before)
+    mujoco.mj_setConst(model, mujoco.MjData(model))

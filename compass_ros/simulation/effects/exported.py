@@ -1,0 +1,115 @@
+"""Fitted effects as YAML."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import yaml
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass as validated
+
+from compass_ros.cells.dynamics import Sliding
+from compass_ros.config import read_yaml
+from compass_ros.errors import ConfigError
+from compass_ros.simulation.effects.attached import Attached
+from compass_ros.simulation.effects.registry import effect
+
+_strict = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+@dataclass(frozen=True)
+class FittedEffect:
+    """An effect with its values and standard deviations, in the order of its quantities."""
+
+    attached: Attached
+    values: tuple[float, ...]
+    std: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What has to be added to a calibrated scene."""
+
+    effects: tuple[FittedEffect, ...]
+    sliding: Mapping[str, Sliding]
+    """The table's friction by body, (1,) each."""
+
+
+@validated(frozen=True, config=_strict, kw_only=True)
+class _Value:
+    value: float
+    unit: str
+    std: float | None = None
+    """None: not known."""
+
+
+@validated(frozen=True, config=_strict, kw_only=True)
+class _Entry:
+    name: str
+    objects: tuple[str, ...]
+    values: Mapping[str, _Value]
+
+
+@validated(frozen=True, config=_strict, kw_only=True)
+class _Contact:
+    friction: float
+    creep: float
+    load: float
+
+
+@validated(frozen=True, config=_strict, kw_only=True)
+class _File:
+    effects: tuple[_Entry, ...]
+    sliding: Mapping[str, _Contact]
+
+
+def write_effects(effects: Sequence[FittedEffect], sliding: Mapping[str, Sliding], path: Path) -> None:
+    """Write name, objects and values with units, and the table's friction, which is no part of the scene."""
+    file = _File(
+        effects=tuple(_entry(fitted) for fitted in effects),
+        sliding={
+            name: _Contact(friction=float(s.friction[0]), creep=float(s.creep[0]), load=float(s.load[0]))
+            for name, s in sliding.items()
+        },
+    )
+    content = TypeAdapter(_File).dump_python(file, mode="json")
+    path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+
+
+def _entry(fitted: FittedEffect) -> _Entry:
+    kind = fitted.attached.effect
+    rows = zip(kind.quantities, fitted.values, fitted.std, strict=True)
+    return _Entry(
+        name=kind.name,
+        objects=fitted.attached.objects,
+        values={q.name: _Value(value=v, unit=q.unit, std=s if np.isfinite(s) else None) for q, v, s in rows},
+    )
+
+
+def read_effects(path: Path) -> Exported:
+    """What `write_effects` wrote. Raises ConfigError with one line."""
+    try:
+        file = TypeAdapter(_File).validate_python(read_yaml(path))
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(str(part) for part in first["loc"])
+        raise ConfigError(f"{path}: {field}: {first['msg']}, found {str(first['input'])[:80]!r}") from error
+    sliding = {
+        name: Sliding(name, np.array([c.friction]), np.array([c.creep]), np.array([c.load]))
+        for name, c in file.sliding.items()
+    }
+    return Exported(tuple(_fitted(entry, path) for entry in file.effects), sliding)
+
+
+def _fitted(entry: _Entry, path: Path) -> FittedEffect:
+    kind = effect(entry.name)
+    expected = {q.name: q.unit for q in kind.quantities}
+    found = {name: value.unit for name, value in entry.values.items()}
+    if found != expected:
+        raise ConfigError(f"{path}: {entry.name}: expected values with units {expected}, found {found}")
+    given = [entry.values[q.name] for q in kind.quantities]
+    std = tuple(float("nan") if v.std is None else v.std for v in given)
+    return FittedEffect(Attached(kind, entry.objects), tuple(v.value for v in given), std)
