@@ -57,7 +57,8 @@ class NodeProcess:
         """Raises NodeError if it has ended."""
         status = self.process.poll()
         if status is not None:
-            raise NodeError(f"node {self.name} ended with status {status}: {self.last_words()} (log: {self.log})")
+            said = self.last_words().removeprefix(f"{self.name}: ")
+            raise NodeError(f"node {self.name} ended with status {status}: {said} (log: {self.log})")
 
     def last_words(self) -> str:
         """Last line of its log."""

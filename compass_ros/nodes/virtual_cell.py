@@ -130,7 +130,7 @@ class VirtualCell(Node):
             shot.names, shot.values = self._command.names, self._command.values
             self._shots.publish(shot)
         if self._image_of_play >= self._play.length:
-            self._command, self._play, self._image_of_play = None, self._rest, 0
+            self._command, self._play, self._drawn = None, self._rest, None
 
     def _on_reveal(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         names = [parameter.name for parameter in self._cell.parameters]
