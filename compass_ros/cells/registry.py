@@ -7,9 +7,10 @@ from collections.abc import Callable
 from compass_ros.cells.air_hockey import AirHockey
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.dynamics import Dynamics
+from compass_ros.cells.mjcf import Mjcf
 from compass_ros.errors import ConfigError, nearest
 
-DYNAMICS: dict[str, Callable[[Cell], Dynamics]] = {"air_hockey": AirHockey}
+DYNAMICS: dict[str, Callable[[Cell], Dynamics]] = {"air_hockey": AirHockey, "mjcf": Mjcf}
 
 
 def dynamics_of(cell: Cell) -> Dynamics:

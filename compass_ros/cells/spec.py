@@ -105,7 +105,8 @@ def validated_spec(content: Mapping[str, object], where: str) -> CellSpec:
     except ValidationError as error:
         first = error.errors()[0]
         name = ".".join(str(part) for part in first["loc"])
-        known = [f.name for spec in (CellSpec, ParameterSpec, ActionSpec, ObjectSpec, FactorSpec) for f in fields(spec)]
+        specs = (CellSpec, ParameterSpec, ActionSpec, ObjectSpec, FactorSpec, StartSpec, ReleaseSpec)
+        known = [f.name for spec in specs for f in fields(spec)]
         hint = nearest(name.rsplit(".", 1)[-1], known) if first["type"] == "unexpected_keyword_argument" else ""
         raise ConfigError(f"{where}: {name}: {first['msg']}, found {str(first['input'])[:80]!r}{hint}") from error
     _check_values(spec, where)
@@ -131,7 +132,8 @@ def _check_names(spec: CellSpec, where: str) -> None:
     parameters, objects = [p.name for p in spec.parameters], {o.name: o for o in spec.objects}
     actions, factors = [a.name for a in spec.action], [f if isinstance(f, str) else f.name for f in spec.factors]
     everything = {"parameters": parameters, "objects": [o.name for o in spec.objects], "action": actions}
-    for section, names in (everything | {"factors": factors}).items():
+    starts = [s.object for s in spec.start]
+    for section, names in (everything | {"factors": factors, "start": starts}).items():
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
             raise ConfigError(f"{where}: {section}: {', '.join(twice)} stands twice")
@@ -140,7 +142,12 @@ def _check_names(spec: CellSpec, where: str) -> None:
         if name not in objects:
             raise ConfigError(f"{where}: factors: unknown object '{name}'; known: {[*objects]}{nearest(name, objects)}")
         if not isinstance(f, str) and f.part not in ("all", "position") and objects[name].quantity != "pose":
-            raise ConfigError(f"{where}: factors: {f.name}: '{name}' is tracked as {objects[name].quantity}, without {f.part}")
+            kind = objects[name].quantity
+            raise ConfigError(f"{where}: factors: {f.name}: '{name}' is tracked as {kind}, without {f.part}")
+    for start in spec.start:
+        if start.object not in objects:
+            hint = nearest(start.object, objects)
+            raise ConfigError(f"{where}: start: unknown object '{start.object}'; known: {[*objects]}{hint}")
     for section, given, known in (("causal", spec.causal, parameters), ("launch_noise", spec.launch_noise, actions)):
         for name in given:
             if name not in known:

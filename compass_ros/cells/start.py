@@ -1,7 +1,8 @@
 """How an episode begins, where no shot command says it: the first state of each object, measured or left free.
 
-Each number of a first state is an input of the cell beside the action's fields. Its standard deviation is what the fit may
-move it by, in each episode anew; 0 keeps it as it was measured. An orientation is moved by a small rotation vector.
+Each number of a first state is an input of the cell beside the action's fields. Its standard deviation is what the fit
+may move it by, in each episode anew; 0 keeps it as it was measured. An orientation is moved by a
+small rotation vector.
 """
 
 from __future__ import annotations
@@ -95,7 +96,8 @@ def _unit(quaternion: Floats, spec: StartSpec, episode: Episode) -> Floats:
     """Of length one, with a positive scalar part."""
     length = float(np.linalg.norm(quaternion))
     if length < 1e-6:
-        raise DataError(f"{episode.source or episode.name}: initial state of {spec.object}: no orientation in {quaternion}")
+        where = f"{episode.source or episode.name}: initial state of {spec.object}"
+        raise DataError(f"{where}: no orientation in {quaternion}")
     return np.asarray(quaternion / (length if quaternion[0] >= 0 else -length))
 
 
@@ -111,9 +113,11 @@ def _from_track(spec: StartSpec, quantity: Quantity, episode: Episode, stated: F
     time = (track.stamp_ns[after] - episode.start_ns) * _NS
     value = track.value[after]
     linear = value[:, :3] if quantity == "pose" else value
-    fit = np.polynomial.polynomial.polyfit(time, linear, 2 if len(after) >= 5 else 1)
+    powers = np.vander(time, 3 if len(after) >= 5 else 2, increasing=True)
+    fit = np.linalg.lstsq(powers, linear, rcond=None)[0]
     at_rest = spec.velocity == "rest"
-    position = stated if len(stated) else np.concatenate([linear[0] if at_rest else fit[0], value[0, linear.shape[1] :]])
+    first = np.concatenate([linear[0] if at_rest else fit[0], value[0, linear.shape[1] :]])
+    position = stated if len(stated) else first
     velocity = np.zeros(linear.shape[1]) if at_rest else fit[1]
     rate = np.zeros(0)
     if quantity == "pose":

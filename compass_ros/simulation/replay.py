@@ -67,8 +67,17 @@ def _arrange(cell: Cell, episode: Episode) -> tuple[Floats, Floats]:
         track, size = known[spec.name], QUANTITY_SIZE[spec.quantity]
         inside = np.isin(track.stamp_ns, stamps)
         values[np.searchsorted(stamps, track.stamp_ns[inside]), column : column + size] = track.value[inside]
+        if spec.quantity == "pose":
+            _follow(values[:, column + 3 : column + 7])
         column += size
     return time, values
+
+
+def _follow(quaternions: Floats) -> None:
+    """Choose the sign of each of (F, 4) quaternions, in place: the first scalar part positive, then without jumps."""
+    seen = quaternions[~np.isnan(quaternions).any(axis=1)]
+    turns = np.concatenate([seen[:1, 0], np.sum(seen[1:] * seen[:-1], axis=1)])
+    quaternions[~np.isnan(quaternions).any(axis=1)] = seen * np.cumprod(np.where(turns < 0, -1.0, 1.0))[:, None]
 
 
 def _at(steps: Floats, time: Floats, values: Floats) -> Floats:
