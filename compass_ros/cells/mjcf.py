@@ -17,7 +17,7 @@ from compass_ros.types import QUANTITY_SIZE, Floats, Ints
 
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS.value
 _FREE, _SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
-_NUDGE_M = 1e-6
+_NUDGE_M = 1e-9
 _TABLE = {"table_friction": None, "table_creep": 0.002, "table_load": 1.0}
 """Fields of a sliding body, with what is taken where the YAML has none."""
 
