@@ -114,7 +114,7 @@ class AirHockey:
         return positions, np.zeros((len(values), self._model.nv))
 
     def controls(self, values: Floats, inputs: Floats, steps: int) -> Floats:
-        """Velocity of the pusher: up in `ramp_time`, constant until the commanded stroke is done, then back out of the way.
+        """Velocity of the pusher: up in `ramp_time`, constant until the stroke is done, then back out of the way.
 
         The heading is the line from the pusher's start to puck 1, turned by the commanded angle. The stroke is timed by
         the commanded speed; the arm reaches only `vel_discount` of it. The turn at the end takes `settle_time`.

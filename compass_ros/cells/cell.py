@@ -112,14 +112,13 @@ class Cell:
         return names.index(parameter)
 
     def values(self, given: Mapping[str, float], where: str = "parameters") -> Floats:
-        """(P,) the defaults with the given ones in place. Raises ConfigError for unknown names and values out of bounds."""
+        """(P,) the defaults with the given ones in place. Raises ConfigError for unknown names and for bad values."""
         values = self.defaults.copy()
         for name, value in given.items():
             parameter = self.parameters[self.index(name)]
             if not parameter.low <= value <= parameter.high:
-                raise ConfigError(
-                    f"{where}: {name} = {value:g} is outside its bounds [{parameter.low:g}, {parameter.high:g}] {parameter.unit}"
-                )
+                bounds = f"[{parameter.low:g}, {parameter.high:g}] {parameter.unit}"
+                raise ConfigError(f"{where}: {name} = {value:g} is outside its bounds {bounds}")
             values[self.index(name)] = value
         return values
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import copy
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -11,75 +13,68 @@ import numpy as np
 from compass_ros.cells import Cell
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.simulation.effects import FittedEffect, write_effects
+from compass_ros.simulation.native.program import mujoco_library
 from compass_ros.simulation.simulator import Simulator
 from compass_ros.types import Floats
 
+_EXACT = 17
+"""Digits that give every double back."""
+
 
 def write_scene(cell: Cell, values: Floats, path: Path) -> None:
-    """The cell's scene with (P,) values in it, as MJCF that MuJoCo loads by itself.
+    """The cell's scene with (P,) values in it, as MJCF that MuJoCo loads by itself, exact to the last digit.
 
     What is no field of a model (the speed that an arm reaches, a camera's bias) stays in result.json.
     """
-    dynamics = dynamics_of(cell)
-    spec = mujoco.MjSpec.from_file(str(cell.model_path))
-    model = copy.copy(dynamics.model)
-    dynamics.apply([model], values[None])
-    _into_spec(spec, model)
-    spec.compile()
-    path.write_text(spec.to_xml(), encoding="utf-8")
+    model = mujoco.MjModel.from_xml_path(str(cell.model_path))
+    dynamics_of(cell).apply([model], values[None])
+    with _digits(_EXACT):
+        mujoco.mj_saveLastXML(str(path), model)
+    _with_inertias(path, model)
 
 
-def _into_spec(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """Copy back the fields that cells tune."""
-    spec.option.gravity = model.opt.gravity
-    spec.option.cone = model.opt.cone
-    for i, pair in enumerate(spec.pairs):
-        pair.solref = model.pair_solref[i]
-        pair.solimp = model.pair_solimp[i]
-    for geom in spec.geoms:
-        index = model.geom(geom.name).id if geom.name else -1
-        if index >= 0:
-            geom.size, geom.pos, geom.quat = model.geom_size[index], model.geom_pos[index], model.geom_quat[index]
-            geom.friction, geom.solref, geom.solimp = (
-                model.geom_friction[index],
-                model.geom_solref[index],
-                model.geom_solimp[index],
-            )
-            body = model.geom_bodyid[index]
-            if body and model.body_geomnum[body] == 1:
-                geom.mass = model.body_mass[body]
-    for joint in spec.joints:
-        dof = model.joint(joint.name).dofadr[0]
-        joint.damping, joint.armature, joint.frictionloss = (
-            _first(joint.damping, model.dof_damping[dof]),
-            float(model.dof_armature[dof]),
-            float(model.dof_frictionloss[dof]),
-        )
-    for i, actuator in enumerate(spec.actuators):
-        actuator.gainprm, actuator.biasprm = model.actuator_gainprm[i], model.actuator_biasprm[i]
+def _with_inertias(path: Path, model: mujoco.MjModel) -> None:
+    """Write masses where bodies have them from their geoms: MuJoCo would compute them from the drawing again."""
+    tree = ElementTree.parse(path)
+    for element in tree.iter("body"):
+        if element.find("inertial") is not None or not element.get("name"):
+            continue
+        body = model.body(element.get("name"))
+        if body.mass[0] > 0:
+            numbers = {"pos": body.ipos, "quat": body.iquat, "mass": body.mass, "diaginertia": body.inertia}
+            text = {name: " ".join(repr(float(x)) for x in value) for name, value in numbers.items()}
+            element.insert(0, ElementTree.Element("inertial", text))
+    ElementTree.indent(tree)
+    tree.write(path, encoding="utf-8")
 
 
-def _first(like: object, value: float) -> object:
-    """`value` in the shape that this version of MuJoCo wants for a joint's damping: a number, or a polynomial."""
-    if isinstance(like, float):
-        return value
-    polynomial = np.zeros(np.shape(like))
-    polynomial[0] = value
-    return polynomial
+@contextmanager
+def _digits(count: int) -> Iterator[None]:
+    """Let MuJoCo write numbers with so many digits; it has no public function for that."""
+    get, put = mujoco_library()["_mjPRIVATE__get_xml_precision"], mujoco_library()["_mjPRIVATE__set_xml_precision"]
+    before = get()
+    put(count)
+    try:
+        yield
+    finally:
+        put(before)
 
 
 def write_effects_of(
     simulator: Simulator | None, values: Floats | None, std: Floats | None, cell: Cell, calibrated: Floats, path: Path
 ) -> None:
-    """The effects of a fitted simulator with their values; without one, the table's friction alone."""
-    sliding = {s.body: s for s in dynamics_of(cell).sliding(calibrated[None])}
+    """The effects of a fitted simulator with its (P + Q,) values and standard deviations, and the table's friction.
+
+    Without such a simulator only the friction, from the (P,) `calibrated` values.
+    """
+    of_cell = calibrated if values is None else values[: len(cell.parameters)]
+    sliding = {s.body: s for s in dynamics_of(cell).sliding(of_cell[None])}
     fitted = []
-    if simulator is not None and values is not None and std is not None:
+    if simulator is not None and values is not None:
+        errors = np.full(len(values), np.nan) if std is None else std
         at = len(cell.parameters)
         for attached in simulator.effects:
-            size = len(attached.effect.quantities)
-            fitted.append(
-                FittedEffect(attached, tuple(values[at : at + size].tolist()), tuple(std[at : at + size].tolist()))
-            )
-            at += size
+            own = slice(at, at + len(attached.effect.quantities))
+            fitted.append(FittedEffect(attached, tuple(values[own].tolist()), tuple(errors[own].tolist())))
+            at = own.stop
     write_effects(fitted, sliding, path)

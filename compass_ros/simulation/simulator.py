@@ -83,7 +83,7 @@ class Simulator:
         return Motion(self.time_step, np.concatenate(parts))
 
     def observe(self, values: Floats, inputs: Floats, time_s: Floats) -> Floats:
-        """(B, F, C) what the tracker would say at (B, F) times [s] since the command, for (B, P) values, (B, A) inputs."""
+        """(B, F, C) what the tracker says at (B, F) times [s] since the command; (B, P) values, (B, A) inputs."""
         parts = [
             self._observe_chunk(values[i : i + CHUNK], inputs[i : i + CHUNK], time_s[i : i + CHUNK])
             for i in range(0, len(values), CHUNK)
@@ -111,7 +111,7 @@ class Simulator:
         for attached, numbers in self._split(values):
             if attached.effect.sensing is not None:
                 sample = attached.effect.sensing(sample, numbers, self._context(attached, values))
-        return sample(time_s)
+        return np.asarray(sample(time_s))
 
     def _chunk(self, values: Floats, inputs: Floats, duration: float) -> Floats:
         return self._dynamics.observe(
@@ -136,7 +136,7 @@ class Simulator:
         self.simulated_seconds += batch * steps * self.time_step
         if self._model.nsensordata:
             rows = np.concatenate([start[:, None], states[:, :-1]], axis=1)
-            return np.concatenate([rows, sensors], axis=2)[:, :, 1 + columns]
+            return np.asarray(np.concatenate([rows, sensors], axis=2)[:, :, 1 + columns])
         return np.concatenate([start[:, None, 1 + columns], states[:, :, 1 + columns]], axis=1)
 
     def _controls(self, values: Floats, inputs: Floats, steps: int) -> Floats:

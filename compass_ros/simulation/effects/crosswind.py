@@ -1,7 +1,8 @@
 """A steady stream of air across the table.
 
-F = m a |w - v| (w - v) / w^2 with w the velocity of the air along (a_x, a_y) and a the acceleration of a body at rest.
-Source: drag equation with the velocity relative to the air. For a fast stream it turns into a constant push, as a tilt is.
+F = m a |w - v| (w - v) / speed^2, a = |(acceleration_x, acceleration_y)| what a body at rest feels, w the velocity of
+the air, `speed` in that direction. Source: drag equation with the velocity relative to the air; a fast stream pushes as
+a tilt does.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Another model of contact friction: MuJoCo's pyramid instead of its elliptic cone, or the reverse.
 
-A choice, not a number: at 0.5 or more the other cone is used. Source: MuJoCo documentation, "Computation", friction cones.
+cone = the other one where other >= 0.5: a choice, not a number. Source: MuJoCo documentation, "Computation".
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """One wall that stands elsewhere or is softer than the others.
 
-The geom moves by `offset`, a wall away from the table, a bar along its thinner side (against its own axis); the stiffness
-of its contacts, k, turns into k exp(softness). Source: geometry and the direct solref format of MuJoCo.
+The geom moves by `offset`, a wall away from the table, a bar along its thinner side (against its own axis); the
+stiffness of its contacts, k, turns into k exp(softness). Source: geometry and the direct solref format of MuJoCo.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Pushes that vary in speed from one episode to the next.
 
-u -> u (1 + deviation), the deviation of this episode drawn with the standard deviation that is the effect's size; what a
-rollout is given is the episode's own deviation. Source: random effect on the launch.
+u -> u (1 + deviation). What a rollout is given is the deviation of its own episode; the effect's size is the standard
+deviation over episodes. Source: random effect on the launch.
 """
 
 from __future__ import annotations

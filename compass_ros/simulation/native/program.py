@@ -46,7 +46,7 @@ class Kind(IntEnum):
 
 
 class Placement(IntEnum):
-    """Where a force goes: joints that slide along x and y (and turn about z), any moving body, or a joint of its own."""
+    """Where a force goes: joints that slide along x and y (and turn about z), any moving body, or a joint."""
 
     PLANAR = 0
     BODY = 1
@@ -89,7 +89,7 @@ class Programs:
         library = _library()
         at, stride = self._programs.ctypes.data, self._programs.strides[0]
         for b, model in enumerate(self._models):
-            if not library.compass_register(model._address, at + b * stride):
+            if not library.compass_register(_address(model), at + b * stride):
                 self._forget(self._models[:b])
                 raise ConfigError(
                     "forces cannot be attached: the model has forces already (detach those first), "
@@ -104,11 +104,11 @@ class Programs:
     def _forget(models: Sequence[mujoco.MjModel]) -> None:
         library = _library()
         for model in models:
-            library.compass_forget(model._address)
+            library.compass_forget(_address(model))
 
 
 def evaluate(term: Term, states: Floats, gravity: float) -> Floats:
-    """(B, F, 2) planar forces [N] of a term in (B, F, 6) states: x, y, vx, vy, mass, time. Same code as in a rollout."""
+    """(B, F, 2) planar forces [N] of a term in (B, F, 6) states (x, y, vx, vy, mass, time); the code of a rollout."""
     batch, frames = states.shape[:2]
     rows = np.zeros((batch, frames), _TERM)
     rows["kind"] = term.kind
@@ -121,8 +121,13 @@ def evaluate(term: Term, states: Floats, gravity: float) -> Floats:
     return out
 
 
+def _address(model: mujoco.MjModel) -> int:
+    """Of the mjModel that the callback will see."""
+    return int(model._address)  # noqa: SLF001 - MuJoCo offers it under this name alone
+
+
 def _place(model: mujoco.MjModel, name: str) -> tuple[Placement, int, int]:
-    """How the forces on a body (or joint) of that name reach the model's degrees of freedom, its id, the first of them."""
+    """How the forces on a body (or joint) of that name reach the degrees of freedom; its id; the first of them."""
     joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
     if joint >= 0:
         return Placement.JOINT, joint, int(model.jnt_dofadr[joint])
@@ -151,12 +156,17 @@ def _joints_of(model: mujoco.MjModel, body: int) -> Placement:
 
 
 @cache
+def mujoco_library() -> ctypes.CDLL:
+    """MuJoCo's own functions, the few that the package for Python does not hand on."""
+    return ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco.so*"))))
+
+
+@cache
 def _library() -> ctypes.PyDLL:
     """Load the compiled forces and install the callback, once a process. Models without a program do not notice it."""
     folder = Path(__file__).parent
     (path,) = folder.glob("_fields*.so")
     library = ctypes.PyDLL(str(path))  # keeps Python's lock: registering is not made for two threads at once
-    core = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco.so*"))))
     library.compass_register.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
     library.compass_register.restype = ctypes.c_int
     library.compass_forget.argtypes = [ctypes.c_void_p]
@@ -165,7 +175,7 @@ def _library() -> ctypes.PyDLL:
     library.compass_evaluate.restype = None
     library.compass_init.argtypes = [ctypes.c_void_p]
     library.compass_init.restype = None
-    library.compass_init(ctypes.cast(core.mj_applyFT, ctypes.c_void_p))
+    library.compass_init(ctypes.cast(mujoco_library().mj_applyFT, ctypes.c_void_p))
     callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
     mujoco.set_mjcb_passive(ctypes.cast(library.compass_passive, callback))
     return library
