@@ -19,43 +19,45 @@ _strict = ConfigDict(extra="forbid")
 class CompassConfig:
     """Hyperparameters of the COMPASS method; defaults from the paper's table of hyperparameters."""
 
-    n_round: int = Field(10, ge=1, description="iterations of Algorithm 1")
-    n_cmd_action: int = Field(10, ge=1, description="real rollouts N used in an iteration")
-    n_sim: int = Field(64, ge=2, description="simulated rollouts M for each real one")
-    n_epochs: int = Field(4000, ge=1, description="passes over the data of one iteration")
-    batch_size: int = Field(64, ge=2)
-    learning_rate: float = Field(1e-3, gt=0)
-    emb_dim: int = Field(32, ge=1, description="width of the encoder of one parameter")
+    n_round: int = Field(default=10, ge=1, description="iterations of Algorithm 1")
+    n_cmd_action: int = Field(default=10, ge=1, description="real rollouts N used in an iteration")
+    n_sim: int = Field(default=64, ge=2, description="simulated rollouts M for each real one")
+    n_epochs: int = Field(default=4000, ge=1, description="passes over the data of one iteration")
+    batch_size: int = Field(default=64, ge=2)
+    learning_rate: float = Field(default=1e-3, gt=0)
+    emb_dim: int = Field(default=32, ge=1, description="width of the encoder of one parameter")
     hidden_dim: tuple[int, ...] = (256, 256)
-    causal_dim: int = Field(32, ge=1, description="features d_z that pass through the graph")
-    sparse_weight: float = Field(0.003, ge=0, description="lambda of loss (2)")
-    sw_discount: float = Field(0.5, gt=0, le=1, description="factor on lambda from one iteration to the next")
-    threshold: float = Field(0.5, gt=0, lt=1, description="psi at or above this is an edge")
+    causal_dim: int = Field(default=32, ge=1, description="features d_z that pass through the graph")
+    sparse_weight: float = Field(default=0.003, ge=0, description="lambda of loss (2)")
+    sw_discount: float = Field(default=0.5, gt=0, le=1, description="factor on lambda from one iteration to the next")
+    threshold: float = Field(default=0.5, gt=0, lt=1, description="psi at or above this is an edge")
     stop_gap_m: float = Field(
-        0.0, ge=0, description="zeta: stop when the mean trajectory difference is at or below [m]"
+        default=0.0, ge=0, description="zeta: stop when the mean trajectory difference is at or below [m]"
     )
     graph_learning_rate: float = Field(
-        1e-2,
+        default=1e-2,
         gt=0,
         description="learning rate of psi; the paper's 0.001 needs all its epochs where psi is still near one",
     )
-    temperature: float = Field(1.0, gt=0, description="temperature of the Gumbel-Softmax")
-    norm_p: float = Field(1.0, gt=0, description="p of the norm in loss (2); the paper names none")
+    temperature: float = Field(default=1.0, gt=0, description="temperature of the Gumbel-Softmax")
+    norm_p: float = Field(default=1.0, gt=0, description="p of the norm in loss (2); the paper names none")
     psi_margin: float = Field(
-        1e-3, gt=0, lt=0.5, description="psi is sampled within [margin, 1 - margin]; keeps logits finite"
+        default=1e-3, gt=0, lt=0.5, description="psi is sampled within [margin, 1 - margin]; keeps logits finite"
     )
     patience_epochs: int = Field(
-        100,
+        default=100,
         ge=0,
         description="stop training when the loss of this many epochs fell by less than `plateau`; 0: all epochs",
     )
-    plateau: float = Field(0.01, ge=0, lt=1, description="least relative fall of loss (2) from one window to the next")
-    update_rate: float = Field(
-        0.05, gt=0, description="eta of update (3), in half-widths per unit of normalised gradient"
+    plateau: float = Field(
+        default=0.01, ge=0, lt=1, description="least relative fall of loss (2) from one window to the next"
     )
-    update_steps: int = Field(500, ge=1, description="most steps of update (3) in an iteration")
+    update_rate: float = Field(
+        default=0.05, gt=0, description="eta of update (3), in half-widths per unit of normalised gradient"
+    )
+    update_steps: int = Field(default=500, ge=1, description="most steps of update (3) in an iteration")
     update_tolerance: float = Field(
-        1e-4, ge=0, description="update (3) has converged when a step is shorter, in half-widths"
+        default=1e-4, ge=0, description="update (3) has converged when a step is shorter, in half-widths"
     )
 
 

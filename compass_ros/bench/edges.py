@@ -12,14 +12,15 @@ from compass_ros.types import Bools, Floats
 
 POINTS = 48
 SHARE = 0.01
-"""An edge is true where the parameter, moved alone, accounts for this share of the variance of d_k in the randomised box."""
+"""An edge is true where the parameter, moved alone, accounts for this share of the variance of d_k in the randomised
+box."""
 
 
 def total_effects(problem: Problem, seed: int = 0, points: int = POINTS) -> Floats:
     """(P, K) total-effect index of each parameter on each trajectory difference, within start +- half-width.
 
-    Estimator of Jansen (1999): E[(d(x) - d(x with x_r drawn anew))^2] / 2 Var(d), the loss in mean squared error of the best
-    possible prediction that does not know x_r. Costs points x (P + 1) rollouts.
+    Estimator of Jansen (1999): E[(d(x) - d(x with x_r drawn anew))^2] / 2 Var(d), the loss in mean squared error of
+    the best possible prediction that does not know x_r. Costs points x (P + 1) rollouts.
     """
     random = np.random.default_rng(seed)
     everything = np.ones(len(problem.parameters), dtype=bool)

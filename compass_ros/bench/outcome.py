@@ -83,7 +83,8 @@ def percentage_errors(values: Floats, truth: Floats) -> Floats:
 
 
 def noise_floor(noise_m: float, world: World) -> float:
-    """Root mean square distance that the noise alone leaves on the held-out shots, for planar and spatial positions [m]."""
+    """Root mean square distance that the noise alone leaves on the held-out shots, for planar and spatial positions
+    [m]."""
     dimensions = [min(len([c for c in world.cell.channels if c == o.name]), 3) for o in world.cell.objects]
     return float(noise_m * math.sqrt(sum(dimensions) / len(dimensions)))
 
@@ -100,7 +101,8 @@ def append(path: Path, row: Row) -> None:
 
 
 def read(path: Path) -> list[dict[str, object]]:
-    """All whole lines of this schema, the last one of each case; a torn line is skipped. Raises DataError on other content."""
+    """All whole lines of this schema, the last one of each case; a torn line is skipped. Raises DataError on other
+    content."""
     if not path.exists():
         return []
     rows: dict[str, dict[str, object]] = {}

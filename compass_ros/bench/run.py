@@ -28,8 +28,8 @@ _PACKAGES = ("compass_ros", "mujoco", "numpy", "scipy", "torch", "sbi", "cma")
 def run_bench(cases: Sequence[Case], out: Path, report: Report = silent, threads: int = 0) -> int:
     """Run what `out/results.jsonl` does not have yet; returns how many cases ran.
 
-    Interrupted runs go on where they were. `report` gets the share of the whole, the case as the stage, and its method's
-    gap; when it asks for a stop, the running case is dropped and nothing of it is written.
+    Interrupted runs go on where they were. `report` gets the share of the whole, the case as the stage, and its
+    method's gap; when it asks for a stop, the running case is dropped and nothing of it is written.
     """
     for case in cases:
         method(case.method)  # a wrong name ends before the first hour, not after it

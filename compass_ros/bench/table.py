@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from statistics import fmean, stdev
 
 from compass_ros.bench.outcome import Row, case_of
 
 PAPER_MAPE = {"compass": 0.22, "npdr": 0.29, "exi-net": 0.95, "tune-net": 3.85}
-"""Mean absolute percentage error of the 8 causal parameters of air hockey, 5 seeds (caption of the paper's figure 4)."""
+"""Mean absolute percentage error of the 8 causal parameters of air hockey, 5 seeds (caption of the paper's figure)."""
 
 Read = Callable[[Row], float]
 
@@ -79,7 +80,7 @@ def share_of_nominal(row: Row) -> float:
 def mean(rows: Iterable[Row], read: Read) -> float:
     """Mean over the rows that have the number."""
     values = [v for v in map(read, rows) if math.isfinite(v)]
-    return sum(values) / len(values) if values else math.nan
+    return fmean(values) if values else math.nan
 
 
 def cell(rows: Sequence[Row], read: Read) -> str:
@@ -87,15 +88,14 @@ def cell(rows: Sequence[Row], read: Read) -> str:
     values = [v for v in map(read, rows) if math.isfinite(v)]
     if not values:
         return "-"
-    middle = sum(values) / len(values)
-    spread = math.sqrt(sum((v - middle) ** 2 for v in values) / max(len(values) - 1, 1))
-    return f"{middle:.3g} ± {spread:.2g}" if len(values) > 1 else f"{middle:.3g}"
+    middle = fmean(values)
+    return f"{middle:.3g} ± {stdev(values):.2g}" if len(values) > 1 else f"{middle:.3g}"
 
 
 def _difference(row: Row, which: str) -> float:
     gap = row[which]
     assert isinstance(gap, dict)
-    return sum(gap["d"].values()) / len(gap["d"])
+    return fmean(gap["d"].values())
 
 
 def _of(rows: Sequence[Row], name: str) -> list[Row]:

@@ -1,11 +1,13 @@
 """The structural causal model f(epsilon, a; G) of COMPASS and its training by loss (2).
 
-Letters: B samples of a batch, P parameters, K factors, A action fields, Z features that pass through the graph. Inputs are
-normalised (parameters by the randomised box, actions by their spread) and outputs standardised by the caller.
+Letters: B samples of a batch, P parameters, K factors, A action fields, Z features that pass through the graph.
+Inputs are normalised (parameters by the randomised box, actions by their spread) and outputs standardised by the
+caller.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -36,8 +38,8 @@ def reproducible_torch() -> Iterator[None]:
 def sample_graph(psi: Tensor, count: int, temperature: float, margin: float, generator: torch.Generator) -> Tensor:
     """Draw `count` graphs (count, P, K) from GumbelSoftmax(psi; temperature), differentiable in psi.
 
-    The difference of two Gumbel variables is logistic, so the two-class softmax is a sigmoid of logit(psi) plus logistic
-    noise (Jang et al. 2016; Maddison et al. 2016).
+    The difference of two Gumbel variables is logistic, so the two-class softmax is a sigmoid of logit(psi) plus
+    logistic noise (Jang et al. 2016; Maddison et al. 2016).
     """
     uniform = torch.rand(count, *psi.shape, generator=generator, dtype=psi.dtype)
     noise = torch.logit(uniform, eps=1e-6)
@@ -47,11 +49,13 @@ def sample_graph(psi: Tensor, count: int, temperature: float, margin: float, gen
 class CausalModel(nn.Module):
     """Encoder of each parameter, graph as a linear transformation, action encoder, and one decoder of each factor.
 
-    The decoder of factor k sees column k of g_epsilon + g_a only, so that an absent edge means that d_k does not depend on
-    the parameter.
+    The decoder of factor k sees column k of g_epsilon + g_a only, so that an absent edge means that d_k does not
+    depend on the parameter.
     """
 
-    def __init__(self, parameters: int, actions: int, factors: int, config: CompassConfig, generator: torch.Generator):
+    def __init__(
+        self, parameters: int, actions: int, factors: int, config: CompassConfig, generator: torch.Generator
+    ) -> None:
         super().__init__()
         self.inputs, self.factors = parameters, factors
         self.rows = torch.arange(parameters)
@@ -64,7 +68,7 @@ class CausalModel(nn.Module):
             return nn.Parameter(weight), nn.Parameter(bias)
 
         def stack(batch: tuple[int, ...], sizes: tuple[int, ...]) -> nn.ParameterList:
-            pairs = zip(sizes[:-1], sizes[1:], strict=True)
+            pairs = itertools.pairwise(sizes)
             return nn.ParameterList([tensor for pair in pairs for tensor in dense(batch, *pair)])
 
         self.psi = nn.Parameter(torch.ones(parameters, factors))
@@ -154,8 +158,8 @@ def train(
 ) -> Training:
     """Fit phi and psi jointly with Adam; psi is projected onto [0, 1] after each step.
 
-    Ends after `config.n_epochs`, or earlier when the mean loss (2) of `config.patience_epochs` epochs is not lower than that
-    of the window before by the share `config.plateau`, or when `proceed` says no.
+    Ends after `config.n_epochs`, or earlier when the mean loss (2) of `config.patience_epochs` epochs is not lower
+    than that of the window before by the share `config.plateau`, or when `proceed` says no.
     """
     rest = [tensor for name, tensor in model.named_parameters() if name != "psi"]
     groups: list[dict[str, Any]] = [{"params": rest}, {"params": [model.psi], "lr": config.graph_learning_rate}]

@@ -1,7 +1,8 @@
 """COMPASS: causality between environment parameters and the sim-to-real gap (Algorithm 1 of the paper).
 
-The policy stays as it is: the actions are those of the recordings. One iteration measures the gap, randomises the parameters
-that still have an edge, fits the causal model from scratch and descends its prediction inside the randomised box.
+The policy stays as it is: the actions are those of the recordings. One iteration measures the gap, randomises the
+parameters that still have an edge, fits the causal model from scratch and descends its prediction inside the
+randomised box.
 """
 
 from __future__ import annotations
@@ -56,9 +57,9 @@ def compass(
 ) -> Estimate:
     """Estimate parameters from `actions` (E, A) of E recorded episodes, starting at `start` (P,).
 
-    Returns the values of the iteration with the smallest measured mean trajectory difference; the trace has every iteration.
-    Each iteration costs E rollouts to measure the gap and N x M to fit the model; a last E measure the final values. `std` is NaN:
-    the method gives a point. `identifiable` marks the parameters that kept an edge.
+    Returns the values of the iteration with the smallest measured mean trajectory difference; the trace has every
+    iteration. Each iteration costs E rollouts to measure the gap and N x M to fit the model; a last E measure the
+    final values. `std` is NaN: the method gives a point. `identifiable` marks the parameters that kept an edge.
     """
     generator = np.random.default_rng(seed)
     episodes = np.arange(len(actions), dtype=np.int64)
@@ -152,7 +153,8 @@ def _iterate(
 def predicted_gap(model: CausalModel, actions: Tensor, shares: Tensor, inputs: Tensor) -> Tensor:
     """J of (3) at `inputs` (P,), averaged over `actions` (E, A), in units of the sum of the factors' spreads.
 
-    J in metres is (1/K) sum_k (mean_k + std_k f_k); `shares` (K,) = std_k / sum std leaves out the constant and the scale.
+    J in metres is (1/K) sum_k (mean_k + std_k f_k); `shares` (K,) = std_k / sum std leaves out the constant and the
+    scale.
     """
     return (model.expected(inputs.expand(len(actions), -1), actions) @ shares).mean()
 

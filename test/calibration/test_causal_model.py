@@ -29,7 +29,8 @@ def model(parameters: int = 3, actions: int = 2, factors: int = 2, seed: int = 0
 def test_sampled_edges_have_the_probability_psi() -> None:
     psi = torch.tensor([[0.1, 0.5], [0.8, 1.0]], dtype=torch.float64)
     graphs = sample_graph(psi, 20_000, 1.0, 1e-3, torch.Generator().manual_seed(1))
-    assert float(graphs.min()) >= 0.0 and float(graphs.max()) <= 1.0
+    assert float(graphs.min()) >= 0.0
+    assert float(graphs.max()) <= 1.0
     share = (graphs > 0.5).double().mean(dim=0).numpy()  # the argmax of a Gumbel-Softmax follows psi at any temperature
     assert np.allclose(share, [[0.1, 0.5], [0.8, 0.999]], atol=0.012)
 
@@ -98,9 +99,11 @@ def test_training_stops_on_a_plateau_and_when_told() -> None:
     flat = CompassConfig(n_epochs=400, patience_epochs=10, plateau=0.5, batch_size=16)
     generator = torch.Generator().manual_seed(0)
     ended = train(model(2, 0), inputs, actions, targets, 0.0, flat, generator, lambda epoch, _: True)
-    assert ended.epochs < 400 and not ended.cancelled
+    assert ended.epochs < 400
+    assert not ended.cancelled
     stopped = train(model(2, 0), inputs, actions, targets, 0.0, flat, generator, lambda epoch, _: epoch < 7)
-    assert stopped.epochs == 7 and stopped.cancelled
+    assert stopped.epochs == 7
+    assert stopped.cancelled
 
 
 def test_dropping_dead_parameters_keeps_the_others_and_their_order() -> None:
@@ -111,5 +114,6 @@ def test_dropping_dead_parameters_keeps_the_others_and_their_order() -> None:
     assert len(causal.rows) < 9  # a quarter and more has gone
     graph = causal.graph()
     assert graph.shape == (12, 2)
-    assert float(graph[0, 0]) > 0.9 and float(graph[1, 1]) > 0.9
+    assert float(graph[0, 0]) > 0.9
+    assert float(graph[1, 1]) > 0.9
     assert float(graph[2:].max()) < 0.1

@@ -9,13 +9,15 @@ import pytest
 
 from compass_ros.calibration.compass import compass
 from compass_ros.config import CompassConfig
-from compass_ros.types import Estimate, Progress, Report, silent
+from compass_ros.types import Estimate, Floats, Ints, Progress, Report, silent
 from test.calibration.planted import Planted, planted
 
 SMALL = CompassConfig(
     n_round=2, n_sim=24, n_epochs=60, emb_dim=8, causal_dim=8, hidden_dim=(32,), patience_epochs=0, batch_size=32
 )
-FAST = {"learning_rate": 0.005, "graph_learning_rate": 0.03, "sparse_weight": 0.01}
+FAST = replace(
+    SMALL, n_round=1, n_sim=48, n_epochs=200, learning_rate=0.005, graph_learning_rate=0.03, sparse_weight=0.01
+)
 FACTORS = ("a", "b")
 
 
@@ -39,7 +41,7 @@ def test_finds_eight_causes_among_sixty_four_and_closes_the_gap(noise: float, se
 
 def test_decoys_are_dropped_and_keep_their_values() -> None:
     world = planted(12, 3, seed=2)
-    found = run(world, replace(SMALL, n_epochs=200, n_sim=48, n_round=1, **FAST))
+    found = run(world, FAST)
     causes = world.edges.any(axis=1)
     assert found.identifiable[causes].all()
     assert found.identifiable[~causes].mean() < 0.2
@@ -51,23 +53,25 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not() -> None:
     world = planted(6, 2)
     first, again, other = run(world, SMALL, 1), run(world, SMALL, 1), run(world, SMALL, 2)
     assert first.values.tobytes() == again.values.tobytes()
-    assert first.graph is not None and again.graph is not None
+    assert first.graph is not None
+    assert again.graph is not None
     assert first.graph.psi.tobytes() == again.graph.psi.tobytes()
     assert first.values.tobytes() != other.values.tobytes()
 
 
 def test_values_never_leave_their_bounds() -> None:
     world = planted(4, 4, seed=3)
-    asked: list[np.ndarray] = []
+    asked: list[Floats] = []
 
-    def spy(values: np.ndarray, episodes: np.ndarray) -> np.ndarray:
+    def spy(values: Floats, episodes: Ints) -> Floats:
         asked.append(values)
         return world.differences(values, episodes)
 
     narrow = tuple(replace(p, low=-0.3, high=0.3, half_width=0.25) for p in world.parameters)
     found = compass(spy, world.actions, narrow, FACTORS, np.zeros(4), SMALL, 0, silent)
     everything = np.concatenate(asked)
-    assert everything.min() >= -0.3 and everything.max() <= 0.3
+    assert everything.min() >= -0.3
+    assert everything.max() <= 0.3
     assert abs(found.values).max() == pytest.approx(0.3, abs=0.06)  # the truth is outside: pushed towards the bound
 
 
@@ -76,7 +80,8 @@ def test_stops_at_the_threshold_before_spending_more() -> None:
     first = float(run(world, replace(SMALL, n_round=1, n_epochs=5)).trace[0].difference.mean())
     assert run(world, replace(SMALL, n_round=1, n_epochs=5, stop_gap_m=0.99 * first)).rollouts > 10
     stopped = run(world, replace(SMALL, stop_gap_m=100.0))
-    assert stopped.rollouts == 10 and stopped.converged
+    assert stopped.rollouts == 10
+    assert stopped.converged
     assert "at or below 100 m" in stopped.stop_reason
 
 
@@ -98,7 +103,7 @@ def test_cancelling_returns_what_there_is() -> None:
 def test_a_factor_that_never_differs_has_no_edge() -> None:
     world = planted(4, 2, seed=5)
 
-    def one_factor(values: np.ndarray, episodes: np.ndarray) -> np.ndarray:
+    def one_factor(values: Floats, episodes: Ints) -> Floats:
         d = world.differences(values, episodes)
         d[:, 1] = 0.0
         return d

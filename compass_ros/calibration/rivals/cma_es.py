@@ -10,8 +10,8 @@ from compass_ros.calibration.rivals.record import Record
 from compass_ros.types import Estimate, Report
 
 SIGMA = 0.5
-"""First step size in half-widths of the randomisation. Chosen: the package leaves it to the user and advises a quarter to
-a half of the range in which the optimum is expected."""
+"""First step size in half-widths of the randomisation. Chosen: the package leaves it to the user and advises a
+quarter to a half of the range in which the optimum is expected."""
 
 
 def cma_es(problem: Problem, allowance: Allowance, seed: int, report: Report) -> Estimate:

@@ -1,10 +1,10 @@
 """EXI-Net (Murooka et al., ICRA 2021): a dynamics model conditioned on the parameters, which are then found through it.
 
 Each iteration, as in the COMPASS paper's reproduction: randomise all parameters around the current ones, learn
-(parameters, action) -> trajectory, and move the parameters by back-propagation until the predicted trajectories meet the
-recorded ones. Chosen, because the tables leave it open: the model predicts the whole trajectory (its 640 samples an
-iteration are rollouts), the implicit part is empty (every tunable parameter is explicit), the parameters move by Adam with
-the table's learning rate times ten inside the randomised box.
+(parameters, action) -> trajectory, and move the parameters by back-propagation until the predicted trajectories meet
+the recorded ones. Chosen, because the tables leave it open: the model predicts the whole trajectory (its 640 samples
+an iteration are rollouts), the implicit part is empty (every tunable parameter is explicit), the parameters move by
+Adam with the table's learning rate times ten inside the randomised box.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """What `mujoco.sysid` does once the residual is built: `mujoco.minimize.least_squares` on whole trajectories.
 
 `mujoco.sysid.optimize` hands its residual function to this solver by default; the residual here is the same one
-(predicted minus measured at the recorded stamps, over the noise), from the batched simulator instead of a list of models.
+(predicted minus measured at the recorded stamps, over the noise), from the batched simulator instead of a list of
+models.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from compass_ros.calibration.rivals.record import Record
 from compass_ros.types import Estimate, Floats, Report
 
 STEP = 1e-3
-"""Finite-difference step as a share of the half-width. Chosen: the solver's default, 1.5e-8 of the value itself, drowns in
-the roughness of contacts; its documentation asks for parameters of order one, which half-widths give."""
+"""Finite-difference step as a share of the half-width. Chosen: the solver's default, 1.5e-8 of the value itself,
+drowns in the roughness of contacts; its documentation asks for parameters of order one, which half-widths give."""
 
 
 class _SpentError(Exception):
@@ -29,8 +30,8 @@ def mujoco_sysid(problem: Problem, allowance: Allowance, seed: int, report: Repo
 
     Coordinates are half-widths from the lower bound, where the solver expects its middle of the box.
 
-    One Jacobian costs P x E rollouts. Standard deviations are those of sysid's own intervals: s^2 (J'J)^-1, NaN where the
-    Jacobian does not see a parameter.
+    One Jacobian costs P x E rollouts. Standard deviations are those of sysid's own intervals: s^2 (J'J)^-1, NaN where
+    the Jacobian does not see a parameter.
     """
     record = Record("mujoco-sysid", problem, report)
     start, width = np.asarray(problem.start, dtype=np.float64), problem.half_width

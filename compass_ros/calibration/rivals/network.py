@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -39,7 +40,7 @@ def perceptron(inputs: int, outputs: int, generator: torch.Generator) -> nn.Sequ
     """ReLU network with the hidden layers of the paper's tables."""
     sizes = (inputs, *HIDDEN, outputs)
     layers: list[nn.Module] = []
-    for rows, columns in zip(sizes[:-1], sizes[1:], strict=True):
+    for rows, columns in itertools.pairwise(sizes):
         linear = nn.Linear(rows, columns)
         with torch.no_grad():
             for tensor in (linear.weight, linear.bias):

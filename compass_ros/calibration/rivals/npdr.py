@@ -1,12 +1,13 @@
 """NPDR (Muratore et al., RA-L 2022): sequential neural posterior estimation of the parameters, on `sbi`.
 
 Settings are the COMPASS paper's table: uniform prior, masked autoregressive flow, LSTM embedding of trajectories
-downsampled by 2, 100 hidden features, 10 transforms, 50 epochs at 3e-4, end after 20 epochs without improvement, combined loss,
-retrained in each round, MCMC with thinning 2. Chosen, because it is left open: one simulation of the posterior is one set of
-parameters rolled out on all N recorded actions, its N trajectories side by side (so an iteration of 640 rollouts has 64
-simulations); an LSTM of 64 units; batches of 50; sbi's vectorised slice sampler, one chain for each sample, on the unit box with
-brackets that start at its width (its default of 0.01 needs minutes a round to grow them in 64 dimensions); the estimate is the mean of the last
-posterior's samples, its standard deviation theirs.
+downsampled by 2, 100 hidden features, 10 transforms, 50 epochs at 3e-4, end after 20 epochs without improvement,
+combined loss, retrained in each round, MCMC with thinning 2. Chosen, because it is left open: one simulation of the
+posterior is one set of parameters rolled out on all N recorded actions, its N trajectories side by side (so an
+iteration of 640 rollouts has 64 simulations); an LSTM of 64 units; batches of 50; sbi's vectorised slice sampler, one
+chain for each sample, on the unit box with brackets that start at its width (its default of 0.01 needs minutes a
+round to grow them in 64 dimensions); the estimate is the mean of the last posterior's samples, its standard deviation
+theirs.
 """
 
 from __future__ import annotations
@@ -124,7 +125,7 @@ def _sample(posterior: NeuralPosterior, prior: BoxUniform, chains: int, seed: in
 
     candidates = np.asarray(prior.sample((1000,)), dtype=np.float64)
     weight = log_density(candidates)
-    random = np.random.RandomState(seed)  # noqa: NPY002 - the sampler asks for this class
+    random = np.random.RandomState(seed)
     weight = np.exp(weight - weight.max())
     start = candidates[random.choice(len(candidates), chains, p=weight / weight.sum())]
     sampler = SliceSamplerVectorized(

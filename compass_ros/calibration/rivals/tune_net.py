@@ -1,9 +1,10 @@
-"""Tune-Net (Allevato et al., CoRL 2019): regress the step in the parameters from a pair of trajectories, then repeat it.
+"""Tune-Net (Allevato et al., CoRL 2019): regress the step in the parameters from a pair of trajectories, then repeat
+it.
 
-Trained once on the rollouts of the whole allowance (6400 in the COMPASS paper), which are drawn uniformly within the bounds;
-then ten updates, each from new rollouts at the current values beside the recorded ones. Chosen, because it is left open:
-pairs are drawn anew in each batch among the rollouts of the same action, and the steps proposed by the recorded
-episodes are averaged.
+Trained once on the rollouts of the whole allowance (6400 in the COMPASS paper), which are drawn uniformly within the
+bounds; then ten updates, each from new rollouts at the current values beside the recorded ones. Chosen, because it is
+left open: pairs are drawn anew in each batch among the rollouts of the same action, and the steps proposed by the
+recorded episodes are averaged.
 """
 
 from __future__ import annotations
@@ -60,7 +61,8 @@ def tune_net(problem: Problem, allowance: Allowance, seed: int, report: Report) 
 def _trained(
     record: Record, rolled: Tensor, unit: Floats, actions: Tensor, each: int, random: np.random.Generator
 ) -> nn.Sequential:
-    """Network from (first trajectory, second trajectory, action) to the step in the parameters, as shares of the bounds."""
+    """Network from (first trajectory, second trajectory, action) to the step in the parameters, as shares of the
+    bounds."""
     generator = torch.Generator().manual_seed(int(random.integers(2**63)))
     places = torch.as_tensor(unit, dtype=torch.float32)
     network = perceptron(2 * rolled.shape[1] + actions.shape[1], places.shape[1], generator)
