@@ -15,6 +15,7 @@ from compass_ros.errors import ConfigError, nearest
 from compass_ros.types import Quantity
 
 _strict = ConfigDict(extra="forbid", allow_inf_nan=False)
+_UNKNOWN = "unexpected_keyword_argument"
 
 
 @validated(frozen=True, config=_strict, kw_only=True)
@@ -103,11 +104,12 @@ def validated_spec(content: Mapping[str, object], where: str) -> CellSpec:
     try:
         spec = TypeAdapter(CellSpec).validate_python(dict(content))
     except ValidationError as error:
-        first = error.errors()[0]
+        found = error.errors()
+        first = next((e for e in found if e["type"] == _UNKNOWN), found[0])  # a misspelt name also lacks the right one
         name = ".".join(str(part) for part in first["loc"])
         specs = (CellSpec, ParameterSpec, ActionSpec, ObjectSpec, FactorSpec, StartSpec, ReleaseSpec)
         known = [f.name for spec in specs for f in fields(spec)]
-        hint = nearest(name.rsplit(".", 1)[-1], known) if first["type"] == "unexpected_keyword_argument" else ""
+        hint = nearest(name.rsplit(".", 1)[-1], known) if first["type"] == _UNKNOWN else ""
         raise ConfigError(f"{where}: {name}: {first['msg']}, found {str(first['input'])[:80]!r}{hint}") from error
     _check_values(spec, where)
     _check_names(spec, where)

@@ -1,7 +1,7 @@
 """Friction that depends on the direction of motion.
 
-F = -N A v / |v| with A = [[along_x, diagonal], [diagonal, -along_x]], the traceless part of a friction tensor.
-Source: Zmitrowicz 2006, friction tensors of second order; the isotropic part is the ordinary coefficient.
+F = -N A v / |v|, A = [[along_x, diagonal], [diagonal, -along_x]] the traceless part of a friction tensor, N the load
+on the table. Source: Zmitrowicz 2006, friction tensors of second order; the isotropic part is the usual coefficient.
 """
 
 from __future__ import annotations

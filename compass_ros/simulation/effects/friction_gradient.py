@@ -1,6 +1,7 @@
 """Friction that changes along the table.
 
-F = -(gradient . r) N v / |v|. Source: first order of a coefficient that depends on the place.
+F = -(along_x x + along_y y) N v / |v|, N the load on the table.
+Source: first order of a coefficient that depends on the place.
 """
 
 from __future__ import annotations

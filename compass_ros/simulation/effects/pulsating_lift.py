@@ -1,6 +1,6 @@
 """Friction that pulsates in time, as under a fan that hunts.
 
-F = -(cosine cos(2 pi f t) + sine sin(2 pi f t)) N v / |v|, t since the command.
+F = -(cosine cos(w t) + sine sin(w t)) N v / |v|, w = 2 pi frequency, t since the command, N the load on the table.
 Source: Coulomb friction under a load that oscillates; only a phase that is the same in each episode can be found.
 """
 

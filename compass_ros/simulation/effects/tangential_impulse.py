@@ -1,6 +1,6 @@
 """Friction between rims in a collision, which turns pucks and deflects them.
 
-F_t = -friction F_n v_t / |v_t|, faded in at 10 mm/s, with F_n the spring and damper of the contact.
+F_t = -friction F_n v_t / |v_t|, faded in at 10 mm/s, with F_n the force along the normal of a contact that is alone.
 Source: Coulomb friction in planar impact (Walton 1993).
 """
 

@@ -1,7 +1,7 @@
 """An arm that cannot go as fast as it is told.
 
-|u| -> |u| / (1 + (|u| / limit)^8)^(1/8), with the inverse of the limit as the number, so that zero is absent.
-Source: smooth saturation, within 9 % of min(|u|, limit) everywhere.
+|u| -> |u| / (1 + (|u| inverse_limit)^8)^(1/8), so that zero is absent.
+Source: smooth saturation, within 9 % of min(|u|, 1 / inverse_limit) everywhere.
 """
 
 from __future__ import annotations

@@ -254,7 +254,7 @@ static void rate_dependent_restitution(const mjModel* m, mjData* d, const Term* 
   }
 }
 
-// Coulomb friction between the rims: the normal force is the spring and damper of the contact, before the solver's rounding.
+// Coulomb friction between the rims. The normal force is what MuJoCo's solver will give a contact that is alone.
 static void tangential_impulse(const mjModel* m, mjData* d, const Term* term) {
   for (int i = 0; i < d->ncon; i++) {
     const mjContact* c = d->contact + i;
@@ -265,7 +265,8 @@ static void tangential_impulse(const mjModel* m, mjData* d, const Term* term) {
     if (m->body_weldid[b]) inverse += 1 / m->body_mass[b];
     const double* kbip = d->efc_KBIP + 4 * c->efc_address;
     double v[3], normal = contact_velocity(m, d, c, v);
-    double load = kbip[2] * (-kbip[0] * kbip[2] * (c->dist - c->includemargin) - kbip[1] * normal) / inverse;
+    double reference = -kbip[0] * kbip[2] * (c->dist - c->includemargin) - kbip[1] * normal;
+    double load = reference / (inverse + d->efc_R[c->efc_address]);
     if (load <= 0) continue;
     double slip2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
     double scale = -term->number[0] * load / sqrt(slip2 + term->number[1] * term->number[1]);
