@@ -8,6 +8,7 @@
 | `servo_gain` | actuator | gain of a position or velocity servo: gainprm[0] and the bias that belongs to it |
 | `command_scale` | actuator | share of the command that arrives |
 | `table_friction`, `table_creep`, `table_load` | body | Coulomb friction of a body that slides on a table, as a force |
+| `start_qpos[i]`, `start_qvel[i]` | joint | added to the first position or velocity of every episode |
 | `observed_offset[i]` | object | added to a tracked number: bias of a camera or encoder |
 """
 
@@ -24,7 +25,7 @@ from compass_ros.types import Floats
 
 Writer = Callable[[mujoco.MjModel, Floats], None]
 """Writes (P,) values into a model."""
-OUTSIDE = ("table_friction", "table_creep", "table_load", "observed_offset")
+OUTSIDE = ("table_friction", "table_creep", "table_load", "start_qpos", "start_qvel", "observed_offset")
 """Made fields that act outside of the model."""
 _GEOM = mujoco.mjtGeom
 

@@ -43,6 +43,8 @@ class Mjcf:
             if "table_friction" not in self._sliding[body]:
                 raise ConfigError(f"{self._where}: body '{body}' has a table_creep or table_load but no table_friction")
         self._offsets = self._offset_columns()
+        self._begins = [(i, *_begin(self._model, p, self._where)) for i, p in enumerate(cell.spec.parameters)
+                        if p.field.startswith("start_")]  # fmt: skip
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -58,6 +60,8 @@ class Mjcf:
             start.write(inputs, positions, velocities)
         for command in self._commands:
             command.begin(inputs, positions, velocities)
+        for parameter, of_positions, places in self._begins:
+            (positions if of_positions else velocities)[:, places] += values[:, parameter, None]
         return positions, velocities
 
     def controls(self, values: Floats, inputs: Floats, steps: int) -> Floats:
@@ -188,6 +192,16 @@ class _Start:
             velocities[:, self._qvel + slides] = state[:, size : 2 * size] @ axes.T
 
 
+def _begin(model: mujoco.MjModel, spec: ParameterSpec, where: str) -> tuple[bool, Ints]:
+    """Whether a parameter shifts first positions (or velocities), and which."""
+    name, index = parse(spec.field, f"{where}: {spec.name}")
+    of_positions = name == "start_qpos"
+    places = rows(model, "qpos" if of_positions else "dof", spec.of, f"{where}: {spec.name}")
+    if (index or 0) >= len(places):
+        raise ConfigError(f"{where}: {spec.name}: field: '{spec.of}' has {len(places)} numbers, found index {index}")
+    return of_positions, places if index is None else places[[index]]
+
+
 def _frame(model: mujoco.MjModel, body: int, joints: range) -> tuple[Floats, Floats]:
     """(J, 3) axes of slide joints in the world and (3,) place of the body, both with all joints at zero."""
     data = mujoco.MjData(model)
@@ -209,7 +223,7 @@ def _turned(quaternion: Floats, vector: Floats) -> Floats:
 def _first_positions(model: mujoco.MjModel) -> Floats:
     """Joint positions at the start: the keyframe `start` where the scene has one, else those of the drawing."""
     keys = [model.key(i).name for i in range(model.nkey)]
-    return np.array(model.key("start").qpos if "start" in keys else model.qpos0, float)
+    return np.asarray(model.key("start").qpos if "start" in keys else model.qpos0, np.float64) + 0.0
 
 
 def _table_fields(parameters: Sequence[ParameterSpec]) -> dict[str, dict[str, int]]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from compass_ros.cells.air_hockey import AirHockey
+from compass_ros.cells.bouncing_ball import BouncingBall
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.dynamics import Dynamics
 from compass_ros.cells.mjcf import Mjcf
 from compass_ros.errors import ConfigError, nearest
 
-DYNAMICS: dict[str, Callable[[Cell], Dynamics]] = {"air_hockey": AirHockey, "mjcf": Mjcf}
+DYNAMICS: dict[str, Callable[[Cell], Dynamics]] = {"air_hockey": AirHockey, "bouncing_ball": BouncingBall, "mjcf": Mjcf}
 
 
 def dynamics_of(cell: Cell) -> Dynamics:
