@@ -11,9 +11,11 @@ from compass_ros.cells import Cell
 from compass_ros.errors import DataError
 from compass_ros.simulation.factors import factor_distance
 from compass_ros.simulation.simulator import Simulator
-from compass_ros.types import QUANTITY_SIZE, Episode, Floats, Gap, Ints
+from compass_ros.types import QUANTITY_SIZE, Bools, Episode, Floats, Gap, Ints, Track
 
 _NS = 1e-9
+GUESSED = 5.0
+"""A frame whose stated standard deviation is this many times the track's median was bridged, not seen."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ def _arrange(cell: Cell, episode: Episode) -> tuple[Floats, Floats]:
     column = 0
     for spec in cell.objects:
         track, size = known[spec.name], QUANTITY_SIZE[spec.quantity]
-        inside = np.isin(track.stamp_ns, stamps)
+        inside = np.isin(track.stamp_ns, stamps) & _seen(track)
         values[np.searchsorted(stamps, track.stamp_ns[inside]), column : column + size] = track.value[inside]
         if spec.quantity == "pose":
             _follow(values[:, column + 3 : column + 7])
@@ -78,6 +80,13 @@ def _follow(quaternions: Floats) -> None:
     seen = quaternions[~np.isnan(quaternions).any(axis=1)]
     turns = np.concatenate([seen[:1, 0], np.sum(seen[1:] * seen[:-1], axis=1)])
     quaternions[~np.isnan(quaternions).any(axis=1)] = seen * np.cumprod(np.where(turns < 0, -1.0, 1.0))[:, None]
+
+
+def _seen(track: Track) -> Bools:
+    """(F,) False where the sensor says that it only predicted: an object behind the arm, say."""
+    if track.std is None:
+        return np.ones(len(track.stamp_ns), bool)
+    return np.asarray(track.std <= GUESSED * np.median(track.std))
 
 
 def _at(steps: Floats, time: Floats, values: Floats) -> Floats:
@@ -104,7 +113,7 @@ class Replay:
         """(B, K) trajectory difference d_k: sum over the control steps of the 2-norm (types.Differences)."""
         steps = np.broadcast_to(self.data.steps_s, (len(values), len(self.data.steps_s)))
         simulated = self.simulator.observe(values, self.data.inputs[episode], steps)
-        return factor_distance(self.simulator.cell, simulated, self.data.at_steps[episode]).sum(axis=1)
+        return np.asarray(factor_distance(self.simulator.cell, simulated, self.data.at_steps[episode]).sum(axis=1))
 
     def gap(self, values: Floats) -> Gap:
         """How far the (P,) values are from all episodes."""
