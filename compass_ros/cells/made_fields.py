@@ -4,7 +4,8 @@
 |---|---|---|
 | `body_mass` | body | the mass, and the inertia in proportion |
 | `geom_turn[axis]`, `body_turn[axis]` | geom, body | rotation [rad] about an axis of the parent, after the scene's |
-| `contact_solref[i]`, `contact_solimp[i]`, `contact_friction[i]` | geom | a pair takes the mean of its two geoms |
+| `contact_solref[i]`, `contact_solimp[i]` | geom | a contact pair takes the mean of its two geoms |
+| `contact_friction[i]` | geom | the same for sliding (0), turning (1) and rolling (2) friction |
 | `servo_gain` | actuator | gain of a position or velocity servo: gainprm[0] and the bias that belongs to it |
 | `command_scale` | actuator | share of the command that arrives |
 | `table_friction`, `table_creep`, `table_load` | body | Coulomb friction of a body that slides on a table, as a force |
@@ -124,6 +125,10 @@ def _bias_index(scene: mujoco.MjModel, actuator: int) -> int:
     return 1 if scene.actuator_biasprm[actuator, 1] else 2
 
 
+_FRICTION: tuple[list[int], ...] = ([0, 1], [2], [3, 4])
+"""Numbers of a pair's friction that are sliding, turning and rolling friction, in the order of a geom's."""
+
+
 def _mixtures(scene: mujoco.MjModel, made: Sequence[Made], where: str) -> list[Writer]:
     """One writer for each number of a pair that is mixed from its two geoms."""
     writers = []
@@ -134,17 +139,17 @@ def _mixtures(scene: mujoco.MjModel, made: Sequence[Made], where: str) -> list[W
         share = 0.5 * np.stack([(partners == m.row).sum(axis=1) for m in own], axis=1)  # (npair, parameters)
         if not share.any(axis=0).all():
             raise ConfigError(f"{where}: {name}: a geom that is in no contact pair; list pairs under <contact>")
-        size = getattr(scene, array).shape[1]
-        if index >= size:
-            raise ConfigError(f"{where}: field: {name} has {size} numbers, found index {index}")
-        rest = (1 - share.sum(axis=1)) * getattr(scene, array)[:, index]
-        writers.append(_mixture(array, index, share, rest, [m.column for m in own]))
+        numbers = _FRICTION if array == "pair_friction" else tuple([i] for i in range(getattr(scene, array).shape[1]))
+        if index >= len(numbers):
+            raise ConfigError(f"{where}: field: {name} has {len(numbers)} numbers, found index {index}")
+        rest = (1 - share.sum(axis=1)) * getattr(scene, array)[:, numbers[index][0]]
+        writers.append(_mixture(array, numbers[index], share, rest, [m.column for m in own]))
     return writers
 
 
-def _mixture(array: str, index: int, share: Floats, rest: Floats, columns: list[int]) -> Writer:
+def _mixture(array: str, numbers: list[int], share: Floats, rest: Floats, columns: list[int]) -> Writer:
     def write(model: mujoco.MjModel, values: Floats) -> None:
-        getattr(model, array)[:, index] = share @ values[columns] + rest
+        getattr(model, array)[:, numbers] = (share @ values[columns] + rest)[:, None]
 
     return write
 

@@ -211,8 +211,8 @@ def _frame(model: mujoco.MjModel, body: int, joints: range) -> tuple[Floats, Flo
 
 def _turned(quaternion: Floats, vector: Floats) -> Floats:
     """(B, 4) quaternions, normalised, then turned by (B, 3) rotation vectors in the body's frame."""
-    unit = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-    out = np.empty_like(unit)
+    unit: Floats = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+    out = np.zeros(unit.shape)
     for i, (q, v) in enumerate(zip(unit, vector, strict=True)):
         angle, turn = float(np.linalg.norm(v)), np.zeros(4)
         mujoco.mju_axisAngle2Quat(turn, v / angle if angle else np.array([0.0, 0.0, 1.0]), angle)
