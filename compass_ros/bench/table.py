@@ -39,7 +39,7 @@ def table(rows: Sequence[Row]) -> str:
         cells = [name, str(len(own)), cell(own, number("mape")), identified, cell(own, held_out_difference)]
         cells += [cell(own, share_of_nominal), cell(own, number("held_out_over_floor"))]
         cells += [cell(own, edge(part)) for part in ("kept", "precision", "recall")]
-        cells += [f"{mean(own, number('rollouts')):.0f}", cell(own, number("wall_seconds"))]
+        cells += [f"{mean(own, number('rollouts_counted_by_simulator')):.0f}", cell(own, number("wall_seconds"))]
         if main:
             cells.insert(3, f"{PAPER_MAPE[name]:.2f}" if name in PAPER_MAPE else "-")
         lines.append("| " + " | ".join(cells) + " |")

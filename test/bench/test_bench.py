@@ -147,6 +147,7 @@ def _row(case: Case, difference: float) -> dict[str, object]:
         "held_out_over_floor": None,
         "edges": {"kept": 2, "precision": 1.0, "recall": None, "missed": [], "extra": []},
         "rollouts": 20,
+        "rollouts_counted_by_simulator": 20,
         "wall_seconds": 1.5,
         "trace": [step, step | {"rollouts": 20, "difference": [0.5, difference / 2]}],
     }
