@@ -1,4 +1,4 @@
-"""Nodes as processes of their own, in a DDS domain of their own; none of them, and no shared memory, outlives its group."""
+"""Nodes as processes, in a DDS domain of their own. Neither they nor their shared memory outlive the group."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ class NodeGroup:
 
 
 def shared_file(name: str) -> Path:
-    """A file of the suite that is no Python: in a checkout, or under share/compass_ros of the prefix it is installed in.
+    """A file of the suite that is no Python, in a checkout or under share/compass_ros of the prefix.
 
     Raises ConfigError where it is not installed.
     """

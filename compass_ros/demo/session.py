@@ -76,9 +76,7 @@ def play(plan: Plan, nodes: NodeGroup, report: Report) -> Played:
         targets = {p.name: p.target for p in plan.cell.spec.parameters if p.target is not None}
         file.write_text(yaml.safe_dump(targets), encoding="utf-8")
         hidden = str(file)
-    cell = nodes.start(
-        "virtual_cell", cell=str(plan.cell.path), hidden_parameters_file=hidden, seed=plan.seed or 0
-    )
+    cell = nodes.start("virtual_cell", cell=str(plan.cell.path), hidden_parameters_file=hidden, seed=plan.seed or 0)
     tracker = nodes.start("puck_tracker")
     recorder = nodes.start("recorder", directory=str(plan.bags))
     shooter = nodes.start("shooter", pipe=True, cell=str(plan.cell.path), shots_file=str(plan.out / MARK), reveal=True)

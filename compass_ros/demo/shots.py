@@ -20,7 +20,7 @@ MOVED_M = 0.05
 JOLT = (1e-4, 1e-4, 1e-3, 1e-3)
 """Standard deviations of x, y [m], angle [rad] and velocity [m/s] from one try of a shot to the next."""
 APART_M = 0.01
-"""Tries of a shot may end this far apart (median) in the nominal simulator; one that never comes out alike teaches little."""
+"""Tries of a shot end no further apart (median, nominal simulator): what never comes out alike teaches little."""
 _TRIES, _CANDIDATES = 8, 1000
 
 
@@ -41,7 +41,7 @@ def draw_shots(cell: Cell, count: int, seed: int) -> tuple[dict[str, float], ...
 
 
 def _useful(cell: Cell, box: Floats, rng: np.random.Generator) -> Iterator[Floats]:
-    """(4,) actions from a box (4, 2) that start clear of the objects, move the first, and come out alike when repeated."""
+    """(4,) actions from a box (4, 2) that start clear of the objects, move the first, and come out alike again."""
     simulator = Simulator(cell, threads=1)
     rest = simulator.observe(cell.defaults[None], box.mean(axis=1)[None], np.zeros((1, 1)))[0, 0].reshape(-1, 2)
     last = 0
@@ -54,7 +54,8 @@ def _useful(cell: Cell, box: Floats, rng: np.random.Generator) -> Iterator[Float
             continue
         tries = np.vstack([action, rng.normal(action, JOLT, (_TRIES, 4))])
         values = np.tile(cell.defaults, (len(tries), 1))
-        ends = simulator.observe(values, tries, np.full((len(tries), 1), cell.duration))[:, 0].reshape(len(tries), -1, 2)
+        seen = simulator.observe(values, tries, np.full((len(tries), 1), cell.duration))
+        ends = seen[:, 0].reshape(len(tries), -1, 2)
         apart = np.linalg.norm(ends[1:] - ends[0], axis=2).max(axis=1)
         if np.linalg.norm(ends[0, 0] - rest[0]) >= MOVED_M and np.median(apart) <= APART_M:
             last = candidate

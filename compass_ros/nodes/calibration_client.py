@@ -1,7 +1,7 @@
 """Node `calibration_client`: asks a calibrator for one calibration and prints how it goes on.
 
-One JSON object a line on standard output: the action's feedback while it runs, its result at the end. Status 1 where the
-calibration fails. Ending the client cancels the calibration.
+One JSON object a line on standard output: the action's feedback while it runs, its result at the end. Status 1 where
+the calibration fails. Ending the client cancels the calibration.
 """
 
 from __future__ import annotations
@@ -70,10 +70,11 @@ def _on_feedback(message: Any) -> None:
 
 def say(content: Mapping[str, object]) -> None:
     """One line for the program that watches; JSON has no NaN."""
-    finite = {
-        name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in content.items()
-    }
-    print(json.dumps(finite), flush=True)
+
+    def finite(value: object) -> object:
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    print(json.dumps({name: finite(value) for name, value in content.items()}), flush=True)
 
 
 def main() -> None:

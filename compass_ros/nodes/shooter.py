@@ -1,8 +1,8 @@
 """Node `shooter`: plays a list of shots, each recorded as an episode of its own; stands where the operator stands.
 
 For each shot it starts an episode, gives the command, waits until the tracker has followed the whole of it, and stops
-the episode. It prints one JSON object a line about each shot on standard output, and at the end, where it is asked to and
-the cell can tell, the true parameters. It ends when all is played; status 1 where something does not answer.
+the episode. It prints one JSON object a line about each shot on standard output, and at the end, where it is asked to
+and the cell can tell, the true parameters. It ends when all is played; status 1 where something does not answer.
 """
 
 from __future__ import annotations

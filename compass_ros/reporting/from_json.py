@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from compass_ros.reporting.words import MODELS
 from compass_ros.types import (
     Budget,
     EffectFinding,
@@ -22,6 +23,7 @@ from compass_ros.types import (
     Where,
 )
 
+Episodes = Literal["fit", "held_out"]
 Json = Mapping[str, Any]
 """A part of result.json, as `read_result` has checked it."""
 
@@ -37,7 +39,7 @@ def from_json(content: Json) -> Result:
         budget=Budget(budget["rollouts"], _number(budget["simulated_seconds"]), _number(budget["wall_seconds"])),
         fit=tuple(content["episodes"]["fit"]),
         held_out=tuple(content["episodes"]["held_out"]),
-        gap={model: _gaps(gap[model]) for model in ("nominal", "calibrated", "with_effects") if gap[model] is not None},
+        gap={model: _gaps(gap[model]) for model in MODELS if gap[model] is not None},
         noise_floor_m=_number(gap["noise_floor_m"]),
         parameters=tuple(_parameter(row) for row in content["parameters"]),
         graph=Graph(
@@ -58,12 +60,13 @@ def _number(value: float | None) -> float:
     return math.nan if value is None else float(value)
 
 
-def _gaps(parts: Json) -> dict[str, Gap]:
-    return {
-        name: Gap({factor: _number(d) for factor, d in part["d"].items()}, _number(part["rmse_m"]))
-        for name, part in parts.items()
-        if part is not None
-    }
+def _gaps(parts: Json) -> dict[Episodes, Gap]:
+    names: tuple[Episodes, ...] = ("fit", "held_out")
+    return {name: _gap(parts[name]) for name in names if parts[name] is not None}
+
+
+def _gap(part: Json) -> Gap:
+    return Gap({factor: _number(d) for factor, d in part["d"].items()}, _number(part["rmse_m"]))
 
 
 def _parameter(row: Json) -> ParameterRow:
