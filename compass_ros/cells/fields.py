@@ -90,7 +90,7 @@ def rows(model: mujoco.MjModel, kind: str, name: str, where: str) -> Ints:
         raise ConfigError(
             f"{where}: of: the scene has no {_word(kind)} '{name}'; it has {_list(known)}{nearest(name, known)}"
         )
-    identity = mujoco.mj_name2id(model, objtype, name)
+    identity = known.index(name) if kind == "pair" else mujoco.mj_name2id(model, objtype, name)
     if kind == "dof":
         first = model.jnt_dofadr[identity]
         return np.arange(first, first + _size(model, identity, (6, 3, 1, 1)))
@@ -101,11 +101,19 @@ def rows(model: mujoco.MjModel, kind: str, name: str, where: str) -> Ints:
 
 
 def names(model: mujoco.MjModel, objtype: mujoco.mjtObj) -> list[str]:
-    """Names of all elements of a kind that have one."""
+    """Names of all elements of a kind that have one; a pair without one is `geom1+geom2`."""
     counts = {_OBJECT.mjOBJ_GEOM: model.ngeom, _OBJECT.mjOBJ_BODY: model.nbody, _OBJECT.mjOBJ_JOINT: model.njnt,
               _OBJECT.mjOBJ_ACTUATOR: model.nu, _OBJECT.mjOBJ_PAIR: model.npair, _OBJECT.mjOBJ_TENDON: model.ntendon,
               _OBJECT.mjOBJ_SITE: model.nsite, _OBJECT.mjOBJ_EQUALITY: model.neq}  # fmt: skip
-    return [n for n in (mujoco.mj_id2name(model, objtype, i) for i in range(counts[objtype])) if n]
+    found = [mujoco.mj_id2name(model, objtype, i) for i in range(counts[objtype])]
+    if objtype == _OBJECT.mjOBJ_PAIR:
+        found = [name or _partners(model, i) for i, name in enumerate(found)]
+    return [name for name in found if name]
+
+
+def _partners(model: mujoco.MjModel, pair: int) -> str:
+    """What a pair without a name is called."""
+    return f"{model.geom(model.pair_geom1[pair]).name}+{model.geom(model.pair_geom2[pair]).name}"
 
 
 def _size(model: mujoco.MjModel, joint: int, sizes: tuple[int, int, int, int]) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
+from compass_ros.cells.auto import with_auto
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.cells.spec import validated_spec
@@ -34,7 +35,7 @@ def load(name_or_path: str | Path) -> Cell:
         raise ConfigError(f"{path}: model: no file {model}")
     cell = Cell(spec, path, hashlib.sha256(path.read_bytes() + model.read_bytes()).hexdigest()[:16])
     dynamics_of(cell)
-    return cell
+    return with_auto(cell) if spec.auto else cell
 
 
 def cells_folder() -> Path:

@@ -85,7 +85,7 @@ class CellSpec:
     horizon: int = Field(ge=1)
     objects: tuple[ObjectSpec, ...]
     factors: tuple[str | FactorSpec, ...]
-    parameters: tuple[ParameterSpec, ...]
+    parameters: tuple[ParameterSpec, ...] = ()
     action: tuple[ActionSpec, ...] = ()
     noise_m: float = Field(0.001, gt=0)
     launch_noise: Mapping[str, float] = Field(default_factory=dict)
@@ -94,7 +94,7 @@ class CellSpec:
     release: ReleaseSpec | None = None
     """When the motion begins, where that differs from episode to episode."""
     auto: bool = False
-    """Cells without code: every other tunable field of the scene becomes a parameter too."""
+    """Every other tunable field of the scene becomes a parameter too."""
     causal: tuple[str, ...] = ()
     """Parameters that the paper found to be causes; used by benchmarks only."""
 
