@@ -17,9 +17,8 @@ from compass_ros.simulation.native.program import Kind, Programs, Term
 class Attachment:
     """Effects that act on a model until `detach`, the end of a `with` block, or the end of this object."""
 
-    def __init__(self, model: mujoco.MjModel, programs: Programs) -> None:
-        self._end = weakref.finalize(self, _end, model, copy.copy(model), programs)
-        programs.__enter__()
+    def __init__(self, model: mujoco.MjModel, before: mujoco.MjModel, programs: Programs) -> None:
+        self._end = weakref.finalize(self, _end, model, before, programs)
 
     def detach(self) -> None:
         """Stop the forces and undo the changes of the model. A second call does nothing."""
@@ -35,9 +34,27 @@ class Attachment:
 def attach(model: mujoco.MjModel, data: mujoco.MjData, exported: Exported) -> Attachment:
     """Let exported effects, and the table's friction that comes with them, act on a model from now on.
 
-    Keep what is returned as long as the model is stepped. Raises ConfigError for effects of the command or of the
-    sensor, which act outside the model, where the model lacks an object, and where it has effects attached already.
+    Keep what is returned as long as the model is stepped. Raises ConfigError, and leaves the model as it was, for effects
+    of the command or of the sensor, which act outside the model, where the model lacks an object, and where it has
+    effects attached already.
     """
+    programs = Programs([model], _terms(model, exported))
+    before = copy.copy(model)
+    try:
+        for fitted in exported.effects:
+            if fitted.attached.effect.model is not None:
+                context = _context(model, exported, fitted.attached.objects)
+                fitted.attached.effect.model(model, np.array(fitted.values), context)
+        programs.__enter__()
+    except ConfigError:
+        restore(model, before)
+        raise
+    mujoco.mj_setConst(model, copy.copy(data))
+    mujoco.mj_forward(model, data)
+    return Attachment(model, before, programs)
+
+
+def _terms(model: mujoco.MjModel, exported: Exported) -> list[Term]:
     terms = [
         Term(Kind.TABLE_FRICTION, s.body, np.stack([s.friction, s.creep, s.load], axis=1))
         for s in exported.sliding.values()
@@ -49,14 +66,7 @@ def attach(model: mujoco.MjModel, data: mujoco.MjData, exported: Exported) -> At
         fitted.attached.check(model)
         if kind.forces is not None:
             terms.extend(kind.forces(np.array([fitted.values]), _context(model, exported, fitted.attached.objects)))
-    attachment = Attachment(model, Programs([model], terms))
-    for fitted in exported.effects:
-        if fitted.attached.effect.model is not None:
-            context = _context(model, exported, fitted.attached.objects)
-            fitted.attached.effect.model(model, np.array(fitted.values), context)
-    mujoco.mj_setConst(model, copy.copy(data))
-    mujoco.mj_forward(model, data)
-    return attachment
+    return terms
 
 
 def _context(model: mujoco.MjModel, exported: Exported, objects: tuple[str, ...]) -> Context:

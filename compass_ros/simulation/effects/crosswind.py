@@ -26,4 +26,5 @@ EFFECT = Effect(
     ),
     sentence="a steady stream of air across the table",
     forces=_forces,
+    superposes=False,
 )

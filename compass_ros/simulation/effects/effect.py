@@ -63,6 +63,8 @@ class Effect:
     sensing: Callable[[Sample, Floats, Context], Sample] | None = None
     ahead: Callable[[Floats, float], float] | None = None
     """(B, q) numbers, last time asked for [s] -> how far beyond it the sensor looks [s]; None: not at all."""
+    superposes: bool = True
+    """Whether small amplitudes add up; False: each direction of the amplitudes is a case of its own."""
     on: Literal["objects", "walls", "cell"] = "objects"
     """What it acts on: `objects` (all that are tracked, or some), `walls` (one fixed geom of the scene), `cell`."""
 

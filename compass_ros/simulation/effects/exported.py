@@ -89,10 +89,10 @@ def _entry(fitted: FittedEffect) -> _Entry:
     )
 
 
-def read_effects(path: Path) -> Exported:
+def read_effects(path: Path | str) -> Exported:
     """What `write_effects` wrote. Raises ConfigError with one line."""
     try:
-        file = TypeAdapter(_File).validate_python(read_yaml(path))
+        file = TypeAdapter(_File).validate_python(read_yaml(Path(path)))
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"])
@@ -104,7 +104,7 @@ def read_effects(path: Path) -> Exported:
     return Exported(tuple(_fitted(entry, path) for entry in file.effects), sliding)
 
 
-def _fitted(entry: _Entry, path: Path) -> FittedEffect:
+def _fitted(entry: _Entry, path: Path | str) -> FittedEffect:
     kind = effect(entry.name)
     expected = {q.name: q.unit for q in kind.quantities}
     found = {name: value.unit for name, value in entry.values.items()}

@@ -1,6 +1,7 @@
 """A patch with other friction.
 
-F = -extra N v / |v| inside `radius`, with a soft edge 1 / (1 + exp(10 (r / radius - 1))); N is the load on the table.
+F = -extra N v / |v| / (1 + exp(10 (r / radius - 1))), r from the centre, so inside `radius` with a soft edge; N is the
+load on the table.
 Source: Coulomb friction with a coefficient that depends on the place.
 """
 

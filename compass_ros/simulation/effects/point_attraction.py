@@ -1,6 +1,6 @@
 """A pull towards a point.
 
-F = -m strength (3 sqrt(3) / 2) core^2 r / (r^2 + core^2)^(3/2); the peak, `strength`, lies at core / sqrt(2).
+F = -m strength (3 sqrt(3) / 2) core^2 r / (r^2 + core^2)^(3/2), r from the centre; the peak lies at core / sqrt(2).
 Source: inverse-square law of a magnet or sink under the table at the depth `core`, its component in the plane.
 """
 

@@ -1,0 +1,110 @@
+"""Effects between the motion and the measurement: on made motions, exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import EFFECTS, Attached, effect
+from compass_ros.simulation.effects.effect import Context, Sample
+from compass_ros.types import Floats
+from test.simulation.table import DESCRIBED, cell, simulator, values
+
+TIME = np.linspace(0.5, 1.0, 30)[None]
+VELOCITY = np.array([0.3, -0.2, 0.1, 0.05])
+START = np.array([-0.2, 0.1, 0.05, -0.1])
+
+
+def line(time: Floats) -> Floats:
+    """Two pucks that move straight on."""
+    return START + VELOCITY * time[:, :, None]
+
+
+def seen(name: str, number: float, sample: Sample = line) -> Floats:
+    """(30, 4) what the sensor says at TIME."""
+    hook = effect(name).sensing
+    assert hook is not None
+    context = Context((), {}, ((0, 1), (2, 3)), (0, 1, 2, 3), 0.001)
+    return hook(sample, np.array([[number]]), context)(TIME)[0]
+
+
+def test_a_latency_shows_the_past() -> None:
+    np.testing.assert_allclose(seen("camera_latency", 0.03), line(TIME - 0.03)[0], atol=1e-15)
+
+
+def test_a_drift_stretches_time() -> None:
+    np.testing.assert_allclose(seen("clock_drift", 0.02), line(1.02 * TIME)[0], atol=1e-15)
+
+
+def test_a_scale_stretches_the_image() -> None:
+    np.testing.assert_allclose(seen("camera_scale", 0.02), 1.02 * line(TIME)[0], atol=1e-15)
+
+
+def test_a_rotation_turns_each_puck_about_the_origin() -> None:
+    turn = np.array([[np.cos(0.05), -np.sin(0.05)], [np.sin(0.05), np.cos(0.05)]])
+    plain = line(TIME)[0]
+    turned = np.hstack([plain[:, :2] @ turn.T, plain[:, 2:] @ turn.T])
+    np.testing.assert_allclose(seen("camera_rotation", 0.05), turned, atol=1e-15)
+
+
+def test_a_lens_moves_points_outwards_by_the_cube_of_their_distance() -> None:
+    plain = line(TIME)[0]
+    outwards = seen("lens_distortion", 0.3) - plain
+    for puck in (slice(0, 2), slice(2, 4)):
+        distance = np.linalg.norm(plain[:, puck], axis=1)
+        np.testing.assert_allclose(np.linalg.norm(outwards[:, puck], axis=1), 0.3 * distance**3, atol=1e-15)
+        assert (np.sum(outwards[:, puck] * plain[:, puck], axis=1) > 0).all()
+
+
+def test_a_rolling_shutter_shows_each_row_at_its_own_time() -> None:
+    """At +half the width the full time later, at -half the width as much earlier; the pucks by themselves."""
+
+    def across(time: Floats) -> Floats:
+        moving = 0.4 * time
+        return np.stack([moving, 0 * time + 0.225, moving, 0 * time - 0.1125], axis=2)
+
+    shown = seen("rolling_shutter", 0.02, across)
+    np.testing.assert_allclose(shown[:, 0], 0.4 * (TIME[0] + 0.02), atol=1e-15)
+    np.testing.assert_allclose(shown[:, 2], 0.4 * (TIME[0] - 0.01), atol=1e-15)
+
+
+def test_a_lag_puts_a_ramp_behind_by_its_time_constant() -> None:
+    np.testing.assert_allclose(seen("tracking_lag", 0.04), line(TIME - 0.04)[0], atol=1e-15)
+
+
+def test_a_lag_is_the_filter_of_its_time_constant() -> None:
+    """Against the filter's answer to a parabola and to a sine, both in closed form."""
+    parabola = seen("tracking_lag", 0.04, lambda t: np.repeat((t**2)[:, :, None], 4, axis=2))
+    np.testing.assert_allclose(parabola[:, 0], TIME[0] ** 2 - 2 * 0.04 * TIME[0] + 2 * 0.04**2, atol=1e-14)
+    w = 2 * np.pi * 2.0
+    sine = seen("tracking_lag", 0.02, lambda t: np.repeat(np.sin(w * t)[:, :, None], 4, axis=2))
+    gain, phase = 1 / np.hypot(1, 0.02 * w), np.arctan(0.02 * w)
+    np.testing.assert_allclose(sine[:, 0], gain * np.sin(w * TIME[0] - phase), atol=1e-6)
+
+
+def test_a_sensor_that_looks_ahead_finds_the_motion_there() -> None:
+    """The last frames of a fast clock show what happened after the last stamp, not a puck that stands still."""
+    fast = Simulator(cell(), [Attached(EFFECTS["clock_drift"], ())], threads=1)
+    times = np.linspace(0, 1.0, 20)[None]
+    ahead = fast.observe(np.append(cell().defaults, 0.1)[None], DESCRIBED[None], times)
+    plain = simulator().observe(values(), DESCRIBED[None], 1.1 * times)
+    np.testing.assert_array_equal(ahead, plain)
+    assert np.linalg.norm(ahead[0, -1] - ahead[0, -2]) > 1e-3
+
+
+def test_the_motion_itself_is_left_alone() -> None:
+    blurred = Simulator(cell(), [Attached(EFFECTS["camera_rotation"], ())], threads=1)
+    turned = blurred.motion(np.append(cell().defaults, 0.1)[None], DESCRIBED[None], 0.5).positions
+    assert (turned == simulator().motion(values(), DESCRIBED[None], 0.5).positions).all()
+
+
+@pytest.mark.parametrize("name", [n for n, e in EFFECTS.items() if e.channel == "sensing"])
+def test_each_rollout_has_its_own_number(name: str) -> None:
+    hook = effect(name).sensing
+    assert hook is not None
+    context = Context((), {}, ((0, 1), (2, 3)), (0, 1, 2, 3), 0.001)
+    numbers = np.array([[0.0], [effect(name).quantities[0].high]])
+    both = hook(line, numbers, context)(np.tile(TIME, (2, 1)))
+    np.testing.assert_array_equal(both[0], line(TIME)[0])
+    assert np.abs(both[1] - both[0]).max() > 1e-4
