@@ -22,17 +22,22 @@ def write_all(
     result: Result, found: Discovery, cell: Cell, out: Path, command: str = "", truth: Mapping[str, float] | None = None
 ) -> None:
     """Write into `out`, each file whole or not at all; result.json last, so that its presence says that all is there."""
+    make_writable(out)
+    values = np.array([row.value for row in result.parameters])
+    write_scene(cell, values, out / SCENE)
+    write_effects_of(found.simulator, found.values, found.effect_std, cell, values, out / EFFECTS)
+    write_report(result, out / "report.html", ReportExtras(command, scene_of(cell), truth=dict(truth or {})))
+    write_result(result, out / "result.json")
+
+
+def make_writable(out: Path) -> None:
+    """Make a folder. Raises ConfigError where that, or writing into it, is not possible."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out):
             pass
     except OSError as error:
         raise ConfigError(f"{out}: cannot be written: {error.strerror}") from error
-    values = np.array([row.value for row in result.parameters])
-    write_scene(cell, values, out / SCENE)
-    write_effects_of(found.simulator, found.values, found.effect_std, cell, values, out / EFFECTS)
-    write_report(result, out / "report.html", ReportExtras(command, scene_of(cell), truth=dict(truth or {})))
-    write_result(result, out / "result.json")
 
 
 def scene_of(cell: Cell) -> Scene:

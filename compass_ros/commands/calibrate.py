@@ -79,13 +79,14 @@ def run(
     from compass_ros.episodes import Source, read_episodes
     from compass_ros.pipeline import calibrate as pipeline
     from compass_ros.reporting import print_result
-    from compass_ros.results import write_all
+    from compass_ros.results import make_writable, write_all
 
     started = time.monotonic()
     cell = load(cell_name)
     validated = calibration_config(config, "command line")
     sources = [Source(o.topic or f"/puck_tracker/{o.name}/pose", o.name, o.quantity) for o in cell.objects]
     episodes = read_episodes(bags, sources, cell.name, cell.hash)
+    make_writable(out)  # now, and not after minutes of work
     with _shown(style) as report:
         result, found = pipeline(episodes, cell, validated, report)
     result = replace(result, budget=replace(result.budget, wall_seconds=time.monotonic() - started))

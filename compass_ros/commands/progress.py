@@ -13,17 +13,19 @@ from compass_ros.types import Progress
 
 
 class Bar:
-    """A `types.Report` that draws a bar on standard error while its context is open."""
+    """A `types.Report` that draws a bar on standard error while its context is open; nothing where that is a file."""
 
     def __init__(self) -> None:
+        console = Console(stderr=True)
         self._bar = RichProgress(
             TextColumn("{task.description}"),
             BarColumn(),
             TaskProgressColumn(),
             TextColumn("{task.fields[gap]}"),
             TimeRemainingColumn(),
-            console=Console(stderr=True),
+            console=console,
             transient=True,
+            disable=not console.is_terminal,
         )
         self._task = self._bar.add_task("reading", total=1.0, gap="")
 

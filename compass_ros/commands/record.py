@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from compass_ros.episodes.recovery import Recovery
-from compass_ros.errors import ConfigError
 
 
 def add_to(app: typer.Typer) -> None:
@@ -23,9 +22,7 @@ def record(
     from compass_ros.episodes import unfinished
 
     if not recover:
-        raise ConfigError(
-            "nothing to recover: give --recover BAG; to record, run the node: ros2 run compass_ros recorder"
-        )
+        raise typer.BadParameter("give --recover BAG; to record, run the node: ros2 run compass_ros recorder")
     for path in recover:
         bags = unfinished(path) if path.is_dir() and unfinished(path) else (path,)
         for bag in bags:

@@ -54,7 +54,10 @@ def find_bags(paths: Iterable[str | Path]) -> tuple[Path, ...]:
     """
     found: dict[Path, Path] = {}
     for path in map(Path, paths):
-        for bag in [path] if is_bag(path) or not path.is_dir() else sorted(filter(is_bag, path.iterdir())):
+        bags = [path] if is_bag(path) or not path.is_dir() else sorted(filter(is_bag, path.iterdir()))
+        if not bags:
+            raise BagError(f"{path}: no episodes: expected a bag or a folder of bags")
+        for bag in bags:
             found.setdefault(bag.resolve(), bag)
     if not found:
         raise BagError("no episodes: expected at least one bag, found none")

@@ -61,7 +61,7 @@ def _arrange(cell: Cell, episode: Episode) -> tuple[Floats, Floats]:
     time = (stamps - episode.start_ns) * _NS
     keep = time <= cell.duration + 1e-6
     stamps, time = stamps[keep], time[keep]
-    if len(time) < 2:
+    if np.sum(time >= 0) < 2:
         raise DataError(f"{episode.source or episode.name}: no frames within {cell.duration:g} s after the command")
     values = np.full((len(stamps), len(cell.channels)), np.nan)
     column = 0
