@@ -151,13 +151,12 @@ def assemble(
     drawn = _draw(cell, data, {n: (r[0], r[2]) for n, r in replays.items()}, held_out=False)
     if held_out:
         drawn += _draw(cell, judge, {n: (r[1], r[2]) for n, r in replays.items()}, held_out=True)
-    spent = [s for s in (simulator, found.simulator) if s is not None]
     return Result(
         cell=cell.name,
         method=estimate.method,
         seed=config.seed,
         versions=versions(),
-        budget=Budget(sum(s.rollouts for s in spent), sum(s.simulated_seconds for s in spent), 0.0),
+        budget=Budget(simulator.rollouts, simulator.simulated_seconds, 0.0),
         fit=data.names,
         held_out=judge.names if held_out else (),
         gap=gap,  # type: ignore[arg-type]  # keys are the literals by construction

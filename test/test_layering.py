@@ -35,7 +35,7 @@ HOME = {library: parts for libraries, parts in HOMES.items() for library in libr
 GUESTS = {"calibration/rivals/mujoco_sysid.py": {"mujoco"}}
 """Single modules that may import a library away from its home: this rival is MuJoCo's own system identification."""
 
-NEIGHBOURS = {("simulation", "cells"), ("discovery", "simulation")}
+NEIGHBOURS = {("simulation", "cells"), ("discovery", "simulation"), ("discovery", "calibration")}
 """Steps of one layer that know each other: what is simulated is a cell, and an effect is part of a simulator."""
 
 

@@ -6,7 +6,6 @@ rho(r) = 2 c^2 (sqrt(1 + r^2 / c^2) - 1), by iteratively reweighted least square
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -62,14 +61,15 @@ def start(likelihood: Likelihood, values: Floats) -> Point:
     return Point(values, np.zeros_like(likelihood.inputs), np.inf)
 
 
-def cost(likelihood: Likelihood, points: list[Point], robust: float) -> Floats:
-    """(N,) cost of each point, all rolled out in one batch."""
+def cost(likelihood: Likelihood, points: list[Point], robust: float) -> tuple[Floats, Floats]:
+    """(N,) cost and (N, E, F, C) residual of each point, all rolled out in one batch."""
     episodes = len(likelihood.inputs)
     values = np.repeat(np.stack([p.values for p in points]), episodes, axis=0)
     inputs = np.concatenate([likelihood.inputs + p.launch for p in points])
-    residual = likelihood.residual(values, inputs, np.tile(np.arange(episodes), len(points)))
+    flat = likelihood.residual(values, inputs, np.tile(np.arange(episodes), len(points)))
+    residual = flat.reshape(len(points), episodes, *flat.shape[1:])
     of_point = _rho(residual, robust).reshape(len(points), -1).sum(axis=1)
-    return np.array([0.5 * c + _prior(likelihood, p) for c, p in zip(of_point, points, strict=True)])
+    return np.array([0.5 * c + _prior(likelihood, p) for c, p in zip(of_point, points, strict=True)]), residual
 
 
 def _rho(residual: Floats, robust: float) -> Floats:
@@ -151,32 +151,72 @@ def minimise(
     iterations: int,
     robust: float = 4.0,
     tolerance: float = 1e-3,
-    keep_going: Callable[[Point], bool] = lambda point: True,
+    linear: Linear | None = None,
+    fresh: bool = True,
 ) -> Fit:
-    """Levenberg-Marquardt from a point until the cost falls by less than `tolerance` (absolute, in log likelihood)."""
-    damping = 1e-3
-    steps = np.ones(len(free))
-    point = replace(point, cost=float(cost(likelihood, [point], robust)[0]))
-    for iteration in range(iterations):
-        linear = linearise(likelihood, point, free, steps)
-        steps = difference_steps(linear)
+    """Levenberg-Marquardt from a point until a step would lower the cost by less than `tolerance` (log likelihood).
+
+    Differences are taken anew only where the model failed to predict what a step did; otherwise Broyden's update keeps it
+    going, which costs no rollout. `linear`: differences that are known already near the point. `fresh`: end with
+    differences at the solution, as standard errors need them.
+    """
+    damping, steps = 1e-3, np.ones(len(free))
+    costs, residuals = cost(likelihood, [point], robust)
+    point, exact = replace(point, cost=float(costs[0])), False
+    if linear is not None:
+        linear, steps = replace(linear, residual=residuals[0]), difference_steps(linear)
+    iteration, converged = 0, False
+    while iteration < iterations and not converged:
+        iteration += 1
+        if linear is None:
+            linear = linearise(likelihood, point, free, steps)
+            steps, exact = difference_steps(linear), True
         hessian, gradient = normal_equations(likelihood, point, linear, free, robust)
-        better = None
-        for _ in range(3):
-            trials = [_step(likelihood, point, free, hessian, gradient, damping * factor) for factor in _TRIALS]
-            costs = cost(likelihood, trials, robust)
-            best = int(np.argmin(costs))
-            if costs[best] < point.cost:
-                damping = max(damping * _TRIALS[best], 1e-9)
-                better = replace(trials[best], cost=float(costs[best]))
-                break
-            damping *= 1e4
-        if better is None or point.cost - better.cost < tolerance:
-            return Fit(better or point, linear, free, robust, iteration + 1, converged=True)
-        point = better
-        if not keep_going(point):
-            return Fit(point, linear, free, robust, iteration + 1, converged=False)
-    return Fit(point, linear, free, robust, iterations, converged=False)
+        trials = [_step(likelihood, point, free, hessian, gradient, damping * factor) for factor in _TRIALS]
+        costs, residuals = cost(likelihood, trials, robust)
+        best = int(np.argmin(costs))
+        gained = point.cost - float(costs[best])
+        if gained > 0:
+            move = _move(likelihood, point, trials[best], free)
+            hoped = -float(gradient @ move + 0.5 * move @ hessian @ move)
+            damping = max(damping * _TRIALS[best], 1e-9)
+            point = replace(trials[best], cost=float(costs[best]))
+            converged = exact and gained < tolerance
+            keep = converged or (gained > 0.5 * hoped and gained > tolerance)
+            linear = _broyden(linear, residuals[best], move) if keep else None
+            exact = False
+        elif exact:
+            damping *= 1e3
+            converged = damping > 1e6
+        else:
+            linear = None  # the updated differences were wrong: take them anew
+    if fresh and not exact or linear is None:
+        linear = linearise(likelihood, point, free, steps)
+    return Fit(point, linear, free, robust, iteration, converged)
+
+
+def _move(likelihood: Likelihood, old: Point, new: Point, free: Ints) -> Floats:
+    """(n,) step from one point to another in standard deviations of the prior."""
+    random = likelihood.launch_std > 0
+    values = (new.values - old.values)[free] / likelihood.prior_std[free]
+    launch = (new.launch - old.launch)[:, random] / likelihood.launch_std[random]
+    return np.concatenate([values, launch.ravel()])
+
+
+def _broyden(linear: Linear, residual: Floats, move: Floats) -> Linear:
+    """The least change of the differences that predicts the step's residual (Broyden 1965, rank one per episode)."""
+    episodes, p = len(residual), linear.jacobian.shape[-1]
+    launches = move[p:].reshape(episodes, -1)
+    predicted = linear.residual + linear.jacobian @ move[:p]
+    predicted += np.einsum("efcl,el->efc", linear.launch_jacobian, launches)
+    missed = residual - predicted
+    length = np.sum(move[:p] ** 2) + np.sum(launches**2, axis=1)  # (E,)
+    share = missed / np.maximum(length, 1e-300)[:, None, None]
+    return Linear(
+        residual,
+        linear.jacobian + share[..., None] * move[:p],
+        linear.launch_jacobian + share[..., None] * launches[:, None, None],
+    )
 
 
 def _step(likelihood: Likelihood, point: Point, free: Ints, hessian: Floats, gradient: Floats, damping: float) -> Point:

@@ -14,6 +14,7 @@ import numpy as np
 
 from compass_ros.calibration.least_squares import (
     Fit,
+    Linear,
     Point,
     difference_steps,
     linearise,
@@ -49,14 +50,13 @@ class Refined:
     chi_square: float
     """Mean squared residual over what noise alone would leave; 1 = the noise floor."""
     strength: Floats
-    """(P,) sigma by which one prior width of each parameter moves all recordings together, at the start."""
+    """(P,) sigma by which one prior width of each parameter moves all recordings together, near the solution."""
 
 
 def refine(likelihood: Likelihood, values: Floats, watch: Watch = lambda *_: True) -> Refined:
     """Fit from the given (P,) values."""
-    strength = sensitivity(likelihood, values)
     point = start(likelihood, values)
-    strong = np.flatnonzero(strength > STRONG)
+    strong = np.flatnonzero(sensitivity(likelihood, point) > STRONG)
     for i, share in enumerate(HORIZONS):
         part = likelihood.until(share * float(likelihood.time_s.max()))
         robust = max(ROBUST, 3.0 * typical_residual(part, point))
@@ -64,26 +64,37 @@ def refine(likelihood: Likelihood, values: Floats, watch: Watch = lambda *_: Tru
         point = minimise(part, point, strong, 8 if last else 4, robust, tolerance=1.0 if last else 5.0).point
         if not watch("refine", 0.7 * (i + 1) / len(HORIZONS), point):
             break
-    return polish(likelihood, point, strength, watch)
+    return polish(likelihood, point, watch)
 
 
-def polish(likelihood: Likelihood, point: Point, strength: Floats, watch: Watch = lambda *_: True) -> Refined:
-    """Free everything that is felt, learn the simulator's roughness there, and fit once more."""
+def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True) -> Refined:
+    """Free everything that is felt, learn the simulator's roughness there, and fit once more.
+
+    What is felt is asked here and not at the start, from where a puck may never have reached some wall.
+    """
+    strength = sensitivity(likelihood, point)
     felt = np.flatnonzero(strength > FELT)
-    fit = minimise(likelihood, point, felt, 6, max(ROBUST, 3.0 * typical_residual(likelihood, point)), tolerance=1.0)
+    fit = minimise(likelihood, point, felt, 12, max(ROBUST, 3.0 * typical_residual(likelihood, point)), tolerance=1.0)
     watch("refine", 0.85, fit.point)
     rough = with_roughness(likelihood, fit)
-    fit = minimise(rough, fit.point, felt, 6, ROBUST, tolerance=0.1)
+    fit = minimise(rough, fit.point, felt, 8, ROBUST, tolerance=0.3, linear=scaled(fit.linear, likelihood, rough))
     watch("refine", 1.0, fit.point)
     hessian, _ = normal_equations(rough, fit.point, fit.linear, felt, ROBUST)
     covariance = np.linalg.inv(hessian) * rough.correlation_time
     return Refined(fit, rough, covariance, chi_square(rough, fit), strength)
 
 
-def sensitivity(likelihood: Likelihood, values: Floats) -> Floats:
+def scaled(linear: Linear, old: Likelihood, new: Likelihood) -> Linear:
+    """Differences in the sigma of another likelihood of the same recordings."""
+    share = old.sigma / new.sigma
+    return Linear(
+        linear.residual * share, linear.jacobian * share[..., None], linear.launch_jacobian * share[..., None]
+    )
+
+
+def sensitivity(likelihood: Likelihood, point: Point) -> Floats:
     """(P,) sigma by which one prior width of each parameter moves all recordings together."""
     everything = np.arange(len(likelihood.parameters))
-    point = start(likelihood, values)
     coarse = linearise(likelihood, point, everything, np.full(len(everything), 0.5))
     return np.asarray(np.sqrt(np.sum(coarse.jacobian**2, axis=(0, 1, 2))))
 

@@ -14,9 +14,18 @@ from mujoco.rollout import Rollout
 from compass_ros.cells import Cell
 from compass_ros.cells.dynamics import Dynamics
 from compass_ros.cells.registry import dynamics_of
+from compass_ros.errors import ConfigError
 from compass_ros.simulation.effects.attached import Attached
-from compass_ros.simulation.effects.effect import Context, Sample, restore
-from compass_ros.simulation.native.program import Kind, Programs, Term
+from compass_ros.simulation.effects.effect import Context, Effect, Sample, restore
+from compass_ros.simulation.native.program import (
+    Kind,
+    Programs,
+    Term,
+    evaluate,
+    mover_masses,
+    path_columns,
+    slides_or_turns,
+)
 from compass_ros.types import QUANTITY_SIZE, Floats, Ints, Parameter
 
 CHUNK = 128
@@ -32,6 +41,14 @@ class Motion:
     time_step: float
     positions: Floats
     """(B, T + 1, C) observed columns before any effect of the sensor."""
+
+
+@dataclass
+class Spent:
+    """What rollouts have cost."""
+
+    rollouts: int = 0
+    seconds: float = 0.0
 
 
 class Simulator:
@@ -54,12 +71,25 @@ class Simulator:
         self._scratch = mujoco.MjData(self._model)
         for attached in self.effects:
             attached.check(self._model)
-        self.rollouts = 0
-        self.simulated_seconds = 0.0
+        self._spent = Spent()
+
+    @property
+    def rollouts(self) -> int:
+        """Rollouts so far, of this simulator and of all that share its cell (`with_effects`)."""
+        return self._spent.rollouts
+
+    @property
+    def simulated_seconds(self) -> float:
+        """The same in simulated time."""
+        return self._spent.seconds
 
     def with_effects(self, effects: Sequence[Attached]) -> Simulator:
-        """The same cell with other effects."""
-        return Simulator(self.cell, effects, self.threads)
+        """The same cell with other effects. Shares threads, models and counters with this one: use one at a time."""
+        other = copy.copy(self)
+        other.effects = tuple(effects)
+        for attached in other.effects:
+            attached.check(self._model)
+        return other
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -74,6 +104,52 @@ class Simulator:
     @property
     def time_step(self) -> float:
         return float(self._model.opt.timestep)
+
+    @property
+    def actuated(self) -> bool:
+        """Whether the cell moves anything by commands."""
+        return bool(self._model.nu)
+
+    def movers(self) -> tuple[str, ...]:
+        """Tracked bodies that slide in the plane and tracked joints: what a force along the way can act on."""
+        names = [spec.body or spec.name for spec in self.cell.objects]
+        return tuple(name for name in names if slides_or_turns(self._model, name))
+
+    def walls(self) -> tuple[str, ...]:
+        """Fixed geoms that a tracked body can touch."""
+        pairs = [(self._model.pair_geom1[i], self._model.pair_geom2[i]) for i in range(self._model.npair)]
+        fixed = {int(g) for pair in pairs for g in pair if self._model.body_weldid[self._model.geom_bodyid[g]] == 0}
+        return tuple(self._model.geom(g).name for g in sorted(fixed) if self._model.geom(g).name)
+
+    def accepts(self, effect: Effect, objects: Sequence[str]) -> bool:
+        """Whether an effect can act on these objects here."""
+        values = self.defaults[None]
+        trial = Attached(effect, tuple(objects))
+        try:
+            trial.check(self._model)
+            if effect.forces is not None:
+                effect.forces(np.array([[q.start or q.scale for q in effect.quantities]]), self._context(trial, values))
+        except ConfigError:
+            return False
+        return True
+
+    def masses(self, values: Floats, names: Sequence[str]) -> Floats:
+        """(N,) mass of each mover at (P,) values [kg]; 1 for joints, on which forces are torques."""
+        self._write(self._models[:1], values[None])
+        return mover_masses(self._models[0], names)
+
+    def forces(self, attached: Attached, numbers: Floats, values: Floats, states: Floats) -> dict[str, Floats]:
+        """(B, F, 2) force of an effect on each mover in given states.
+
+        (B, q) numbers, (P,) values of the cell, (B, F, N, 6) states x, y, vx, vy, mass, time of the effect's N objects.
+        """
+        tiled = np.tile(values, (len(numbers), 1))
+        terms = attached.effect.forces(numbers, self._context(attached, tiled)) if attached.effect.forces else ()
+        gravity = -float(self._model.opt.gravity[2])
+        out = {name: np.zeros((*states.shape[:2], 2)) for name in attached.objects}
+        for term in terms:
+            out[term.object] += evaluate(term, states[:, :, attached.objects.index(term.object)], gravity)
+        return out
 
     def motion(self, values: Floats, inputs: Floats, duration: float) -> Motion:
         """Roll out (B, P) values with (B, A) inputs for `duration` seconds."""
@@ -97,6 +173,18 @@ class Simulator:
         positions = _interpolate(states, self.time_step, time_s[None])
         poses = self._dynamics.poses(self._of_cell(values[None]), positions)
         return {name: pose[0] for name, pose in poses.items()}
+
+    def paths(self, values: Floats, inputs: Floats, time_s: Floats, names: Sequence[str]) -> Floats:
+        """(B, F, N, 4) x, y [m], vx, vy [m/s] in the world of N bodies on the table; joints: angle, 0, rate, 0."""
+        columns, rest = [], []
+        for name in names:
+            own, offset = path_columns(self._model, name)
+            columns.extend(own)
+            rest.append(offset)
+        states = self._roll(values, inputs, float(np.max(time_s)), np.maximum(columns, 0))
+        rows = _interpolate(states, self.time_step, np.broadcast_to(time_s, (len(values), time_s.shape[-1])))
+        rows = np.where(np.array(columns) >= 0, rows, 0.0).reshape(*rows.shape[:2], len(names), 4)
+        return np.asarray(rows + np.array(rest))
 
     def _observe_chunk(self, values: Floats, inputs: Floats, time_s: Floats) -> Floats:
         last = float(np.nanmax(time_s))
@@ -132,8 +220,8 @@ class Simulator:
         controls = self._controls(values, inputs, steps) if self._model.nu else None
         with Programs(models, self._terms(values)):
             states, sensors = self._pool.rollout(models, self._data, start, controls, nstep=steps)
-        self.rollouts += batch
-        self.simulated_seconds += batch * steps * self.time_step
+        self._spent.rollouts += batch
+        self._spent.seconds += batch * steps * self.time_step
         if self._model.nsensordata:
             rows = np.concatenate([start[:, None], states[:, :-1]], axis=1)
             return np.asarray(np.concatenate([rows, sensors], axis=2)[:, :, 1 + columns])

@@ -34,9 +34,9 @@ class Attachment:
 def attach(model: mujoco.MjModel, data: mujoco.MjData, exported: Exported) -> Attachment:
     """Let exported effects, and the table's friction that comes with them, act on a model from now on.
 
-    Keep what is returned as long as the model is stepped. Raises ConfigError, and leaves the model as it was, for effects
-    of the command or of the sensor, which act outside the model, where the model lacks an object, and where it has
-    effects attached already.
+    Keep what is returned as long as the model is stepped. Raises ConfigError, and leaves the model as it was, for
+    effects of the command or of the sensor, which act outside the model, where the model lacks an object, and where it
+    has effects attached already.
     """
     programs = Programs([model], _terms(model, exported))
     before = copy.copy(model)

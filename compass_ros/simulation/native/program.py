@@ -179,3 +179,31 @@ def _library() -> ctypes.PyDLL:
     callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
     mujoco.set_mjcb_passive(ctypes.cast(library.compass_passive, callback))
     return library
+
+
+def path_columns(
+    model: mujoco.MjModel, name: str
+) -> tuple[tuple[int, int, int, int], tuple[float, float, float, float]]:
+    """Where a body on the table (or a joint) is in (qpos, qvel): x, y, vx, vy, -1 for none; and its place at qpos 0."""
+    placement, identity, dof = _place(model, name)
+    if placement is Placement.JOINT:
+        return (int(model.jnt_qposadr[identity]), -1, model.nq + dof, -1), (0.0, 0.0, 0.0, 0.0)
+    position = int(model.jnt_qposadr[model.body_jntadr[identity]])
+    x, y = (float(p) for p in model.body_pos[identity][:2]) if placement is not Placement.BODY else (0.0, 0.0)
+    return (position, position + 1, model.nq + dof, model.nq + dof + 1), (x, y, 0.0, 0.0)
+
+
+def slides_or_turns(model: mujoco.MjModel, name: str) -> bool:
+    """Whether a name is a body that slides in the plane, or a joint."""
+    if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) >= 0:
+        return True
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+    return body >= 0 and model.body_jntnum[body] > 0 and _place(model, name)[0] is not Placement.BODY
+
+
+def mover_masses(model: mujoco.MjModel, names: Sequence[str]) -> Floats:
+    """(N,) mass of each mover [kg]; 1 for joints."""
+    joints = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) >= 0 for name in names]
+    return np.array(
+        [1.0 if joint else float(model.body_mass[model.body(n).id]) for n, joint in zip(names, joints, strict=True)]
+    )

@@ -1,0 +1,116 @@
+"""Parameters and effects fitted together, in the full simulator, from the first-order solution."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compass_ros.calibration.least_squares import Fit, Linear, Point, cost, minimise, normal_equations
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.discovery.screen import Score, Space
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import Attached
+from compass_ros.types import Floats
+
+_SHARES = (0.0, 0.15, 0.4, 0.7, 1.0)
+"""Parts of the first-order step that are tried as a start."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A fit of the cell's parameters together with effects."""
+
+    simulator: Simulator
+    likelihood: Likelihood
+    fit: Fit
+    added: tuple[Attached, ...]
+    """The effects of this fit."""
+
+    @property
+    def name(self) -> str:
+        return "+".join(sorted(a.effect.name for a in self.added))
+
+    def log_evidence(self, correlation_time: float) -> float:
+        """Laplace approximation in the prior's units, the data's part divided by the correlation time."""
+        hessian, _ = normal_equations(self.likelihood, self.fit.point, self.fit.linear, self.fit.free, self.fit.robust)
+        return -self.fit.point.cost / correlation_time - 0.5 * float(np.linalg.slogdet(hessian)[1])
+
+
+def widened(simulator: Simulator, likelihood: Likelihood, added: Sequence[Attached]) -> tuple[Simulator, Likelihood]:
+    """A simulator and likelihood with more effects; priors wide compared with a modest effect, bounded by what is physical."""
+    wider = simulator.with_effects([*simulator.effects, *added])
+    quantities = [q for a in added for q in a.effect.quantities]
+    mean = [0.0 if q.amplitude else q.start for q in quantities]
+    std = [20 * q.scale if q.amplitude else (q.high - q.low) / 4 for q in quantities]
+    return wider, replace(
+        likelihood,
+        predict=wider.observe,
+        parameters=wider.parameters,
+        prior_mean=np.concatenate([likelihood.prior_mean, mean]),
+        prior_std=np.concatenate([likelihood.prior_std, std]),
+    )
+
+
+def fit_jointly(space: Space, scores: Sequence[Score], iterations: int, tolerance: float = 1.0) -> Joint:
+    """Start from the first-order solution of one or more candidates and converge."""
+    added = tuple(s.candidate.attached for s in scores)
+    simulator, likelihood = widened(space.simulator, space.likelihood, added)
+    numbers = np.concatenate([s.numbers for s in scores])
+    step = _parameter_step(space, scores)
+    base, free = space.fit.point, space.fit.free
+    starts = []
+    for share in _SHARES:
+        values = base.values.copy()
+        values[free] += share * step[: len(free)] * space.likelihood.prior_std[free]
+        sizes = np.concatenate([_scaled(s, share) for s in scores])
+        values = np.concatenate([values, sizes])
+        starts.append(Point(np.clip(values, likelihood.low, likelihood.high), base.launch, np.inf))
+    costs, residuals = cost(likelihood, starts, space.fit.robust)
+    best = int(np.argmin(costs))
+    start = starts[best]
+    if best == 0:  # nothing but the smallest step helps: begin with it, amplitudes must not be exactly zero
+        start = replace(starts[1], cost=np.inf)
+    everything = np.concatenate([free, len(base.values) + np.arange(len(numbers))])
+    linear = _extended(space, likelihood, start, residuals[max(best, 1)], everything)
+    fit = minimise(likelihood, start, everything, iterations, space.fit.robust, tolerance, linear, fresh=False)
+    return Joint(simulator, likelihood, fit, added)
+
+
+def converge(joint: Joint, iterations: int = 8) -> Joint:
+    """To the end, with differences at the solution."""
+    fit = minimise(joint.likelihood, joint.fit.point, joint.fit.free, iterations, joint.fit.robust, 0.3, joint.fit.linear)
+    return replace(joint, fit=fit)
+
+
+def _scaled(score: Score, share: float) -> Floats:
+    """(q,) numbers with the amplitudes at a share."""
+    amplitude = np.array([q.amplitude for q in score.candidate.attached.effect.quantities])
+    return np.where(amplitude, share * score.numbers, score.numbers)
+
+
+def _parameter_step(space: Space, scores: Sequence[Score]) -> Floats:
+    """(n,) first-order change of parameters (and launches) when the candidates take their part."""
+    rest = space.residual + np.sum([s.tangent for s in scores], axis=0)
+    gradient = space.parameters.T @ rest
+    prior = (space.fit.point.values - space.likelihood.prior_mean)[space.fit.free]
+    gradient[: len(prior)] += prior / space.likelihood.prior_std[space.fit.free]
+    return np.asarray(-space.inverse @ gradient)
+
+
+def _extended(space: Space, likelihood: Likelihood, point: Point, residual: Floats, free: np.ndarray) -> Linear:
+    """The base's differences with those of the new quantities at the start."""
+    old = space.fit.linear
+    new = free[old.jacobian.shape[-1] :]
+    episodes = len(likelihood.inputs)
+    steps = np.clip(0.02 * likelihood.prior_std[new], 1e-9, None)
+    steps = np.where(point.values[new] + steps > likelihood.high[new], -steps, steps)
+    values = np.tile(point.values, (len(new), 1))
+    values[np.arange(len(new)), new] += steps
+    index = np.tile(np.arange(episodes), len(new))
+    inputs = np.tile(likelihood.inputs + point.launch, (len(new), 1))
+    there = likelihood.residual(np.repeat(values, episodes, axis=0), inputs, index)
+    change = there.reshape(len(new), *residual.shape) - residual
+    scaled = np.moveaxis(change * (likelihood.prior_std[new] / steps)[:, None, None, None], 0, -1)
+    return Linear(residual, np.concatenate([old.jacobian, scaled], axis=-1), old.launch_jacobian)

@@ -1,0 +1,200 @@
+"""What each candidate could explain, to first order: its tangent, projected off those of the parameters.
+
+Everything happens in the space of the calibrated residual r [sigma]. A candidate with tangent T (one column for each
+amplitude) lowers the cost by 1/2 g' S^-1 g with g = T'r and S = T'T, both after the parameters have taken what they can:
+S = T'T - T'J (J'J + 1)^-1 J'T. For forces, T = R a with R the impulse responses and a the accelerations along the paths,
+so that shapes (a centre, a radius, a frequency) are searched without a rollout.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.optimize import minimize
+
+from compass_ros.calibration.least_squares import Fit
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.discovery.candidates import Candidate
+from compass_ros.discovery.impulses import Impulses
+from compass_ros.simulation import Simulator
+from compass_ros.types import Floats
+
+
+@dataclass(frozen=True)
+class Score:
+    """A candidate at its best shape."""
+
+    candidate: Candidate
+    numbers: Floats
+    """(q,) all quantities: amplitudes of the first-order solution, best shapes."""
+    gain: float
+    """Fall of the cost [log likelihood]."""
+    tangent: Floats
+    """(D,) change of the weighted residual by the whole effect, not projected; D residuals of all episodes."""
+
+
+class Space:
+    """Weighted residuals and tangents at a fit, with the parameters' part taken out on demand. D = E * F * C."""
+
+    def __init__(self, simulator: Simulator, likelihood: Likelihood, fit: Fit, pushes: Impulses) -> None:
+        self.simulator = simulator
+        self.likelihood = likelihood
+        self.fit = fit
+        self.pushes = pushes
+        episodes = len(likelihood.inputs)
+        weight = (1 + (fit.linear.residual / fit.robust) ** 2) ** -0.25
+        self.weight = weight.reshape(episodes, -1)
+        base = fit.linear.jacobian.reshape(episodes, self.weight.shape[1], -1) * self.weight[:, :, None]
+        own = fit.linear.launch_jacobian.reshape(episodes, self.weight.shape[1], -1) * self.weight[:, :, None]
+        launches = np.zeros((episodes, self.weight.shape[1], episodes, own.shape[2]))
+        launches[np.arange(episodes), :, np.arange(episodes)] = own
+        parameters = np.concatenate([base, launches.reshape(*self.weight.shape, -1)], axis=2)
+        self.residual = (fit.linear.residual.reshape(episodes, -1) * self.weight).ravel()
+        self.parameters = parameters.reshape(self.residual.size, -1)
+        self.inverse = np.linalg.inv(self.parameters.T @ self.parameters + np.eye(self.parameters.shape[1]))
+        response = pushes.response * self.weight[:, :, None]
+        self._response = response
+        self._gram = np.einsum("edh,edi->ehi", response, response)
+        by_episode = self.parameters.reshape(*self.weight.shape, -1)
+        self._cross = np.einsum("edh,edp->ehp", response, by_episode)
+        self._pull = np.einsum("edh,ed->eh", response, self.residual.reshape(self.weight.shape))
+        self._states = np.concatenate(
+            [
+                pushes.paths,
+                np.broadcast_to(pushes.mass[:, None], (*pushes.paths.shape[:3], 1)),
+                np.broadcast_to(pushes.moments[:, None, None], (*pushes.paths.shape[:3], 1)),
+            ],
+            axis=3,
+        )
+
+    def weights(self, candidate: Candidate, shapes: Floats, direction: Floats) -> Floats:
+        """(E, H, n) accelerations at all moments per unit of each of n amplitudes, for forces.
+
+        (q,) `shapes` with the shape quantities filled in; `direction` (n, q) amplitude vectors of the n columns.
+        """
+        objects = candidate.attached.objects
+        chosen = [self.pushes.movers.index(name) for name in objects]
+        episodes, moments, movers = self._states.shape[:3]
+        out = np.zeros((episodes, moments, movers, 2, len(direction)))
+        states = np.ascontiguousarray(self._states[:, :, chosen])
+        cell = self.fit.point.values[: len(self.simulator.cell.parameters)]
+        for i, amplitudes in enumerate(direction):
+            numbers = np.tile(shapes + amplitudes, (episodes, 1))
+            size = float(np.max(np.abs(amplitudes)))
+            forces = self.simulator.forces(candidate.attached, numbers, cell, states)
+            for name, n in zip(objects, chosen, strict=True):
+                out[:, :, n, :, i] = forces[name] / self.pushes.mass[n] / size
+        return out.reshape(episodes, moments * movers * 2, len(direction))
+
+    def tangent_of_weights(self, weights: Floats) -> Floats:
+        """(D, n) tangents of (E, H, n) accelerations."""
+        return np.asarray((self._response @ weights).reshape(self.residual.size, -1))
+
+    def reduced(self, weights: Floats) -> tuple[Floats, Floats]:
+        """(n, n) S and (n,) g of accelerations, with the parameters taken out."""
+        gram = np.einsum("ehm,ehi,ein->mn", weights, self._gram, weights, optimize=True)
+        cross = np.einsum("ehn,ehp->np", weights, self._cross)
+        pull = np.einsum("ehn,eh->n", weights, self._pull)
+        return self._project(gram, cross, pull)
+
+    def reduced_tangent(self, tangent: Floats) -> tuple[Floats, Floats]:
+        """The same for (D, n) tangents."""
+        return self._project(tangent.T @ tangent, tangent.T @ self.parameters, tangent.T @ self.residual)
+
+    def _project(self, gram: Floats, cross: Floats, pull: Floats) -> tuple[Floats, Floats]:
+        absorbed = cross @ self.inverse
+        return gram - absorbed @ cross.T, pull - absorbed @ (self.parameters.T @ self.residual)
+
+    def off_parameters(self, tangent: Floats) -> Floats:
+        """(D, n) the part of tangents that the parameters cannot take."""
+        return np.asarray(tangent - self.parameters @ (self.inverse @ (self.parameters.T @ tangent)))
+
+
+def solve(matrix: Floats, pull: Floats, low: Floats, high: Floats, prior: Floats) -> tuple[Floats, float]:
+    """(n,) amplitudes within bounds that lower the cost most, and by how much, with a Gaussian prior of std `prior`."""
+    full = matrix + np.diag(1 / prior**2)
+    amplitudes = np.zeros(len(pull))
+    loose = np.ones(len(pull), bool)
+    for _ in range(len(pull) + 1):
+        amplitudes[loose] = -np.linalg.solve(
+            full[np.ix_(loose, loose)], pull[loose] + full[np.ix_(loose, ~loose)] @ amplitudes[~loose]
+        )
+        outside = loose & ((amplitudes < low) | (amplitudes > high))
+        if not outside.any():
+            break
+        amplitudes[outside] = np.clip(amplitudes[outside], low[outside], high[outside])
+        loose &= ~outside
+    return amplitudes, -float(pull @ amplitudes + 0.5 * amplitudes @ full @ amplitudes)
+
+
+def score_force(space: Space, candidate: Candidate) -> Score:
+    """Best shape and amplitudes of a force: a grid over the shapes, then a simplex from the best three points."""
+    quantities = candidate.attached.effect.quantities
+    shape_of = [i for i, q in enumerate(quantities) if not q.amplitude]
+    best: list[tuple[float, Floats]] = []
+    for point in product(*(_grid(quantities[i].name, quantities[i].low, quantities[i].high) for i in shape_of)):
+        shapes = np.zeros(len(quantities))
+        shapes[shape_of] = point
+        _, gain = _at(space, candidate, shapes)
+        best.append((gain, shapes))
+    best.sort(key=lambda item: -item[0])
+    if shape_of:
+        low, high = (np.array([getattr(quantities[i], side) for i in shape_of]) for side in ("low", "high"))
+
+        def fall(point: Floats) -> float:
+            shapes = np.zeros(len(quantities))
+            shapes[shape_of] = point
+            return -_at(space, candidate, shapes)[1]
+
+        for _, shapes in list(best[:3]):
+            found = minimize(
+                fall, shapes[shape_of], method="Nelder-Mead", bounds=list(zip(low, high, strict=True)),
+                options={"maxfev": 60 * len(shape_of), "xatol": 1e-4, "fatol": 1e-2},
+            )  # fmt: skip
+            polished = np.zeros(len(quantities))
+            polished[shape_of] = found.x
+            best.append((-float(found.fun), polished))
+        best.sort(key=lambda item: -item[0])
+    gain, shapes = best[0]
+    numbers, gain = _at(space, candidate, shapes)
+    directions = np.diag([q.scale for q in quantities])[[i for i, q in enumerate(quantities) if q.amplitude]]
+    if not candidate.attached.effect.superposes:
+        directions = (numbers - shapes)[None]
+    columns = space.tangent_of_weights(space.weights(candidate, shapes, directions))
+    sizes = (numbers - shapes)[[i for i, q in enumerate(quantities) if q.amplitude]]
+    if not candidate.attached.effect.superposes:
+        sizes = np.array([np.max(np.abs(numbers - shapes))])
+    return Score(candidate, numbers, gain, columns @ sizes)
+
+
+def _at(space: Space, candidate: Candidate, shapes: Floats) -> tuple[Floats, float]:
+    """(q,) numbers with the best amplitudes at a shape, and the gain."""
+    quantities = candidate.attached.effect.quantities
+    amplitude_of = [i for i, q in enumerate(quantities) if q.amplitude]
+    low, high, prior = (
+        np.array([getattr(quantities[i], side) for i in amplitude_of]) for side in ("low", "high", "scale")
+    )
+    unit = np.diag([q.scale for q in quantities])[amplitude_of]
+    if candidate.attached.effect.superposes:
+        amplitudes, gain = solve(*space.reduced(space.weights(candidate, shapes, unit)), low, high, 20 * prior)
+        numbers = shapes.copy()
+        numbers[amplitude_of] = amplitudes
+        return numbers, gain
+    best = (shapes, 0.0)
+    for angle in np.linspace(0, 2 * np.pi, 12, endpoint=False):
+        ray = np.cos(angle) * unit[0] + np.sin(angle) * unit[1]
+        top = float(np.max(np.abs(ray)))
+        size, gain = solve(*space.reduced(space.weights(candidate, shapes, ray[None])),
+                           np.zeros(1), np.array([high.min()]), 20 * prior[:1])  # fmt: skip
+        if gain > best[1]:
+            best = (shapes + ray / top * size[0], gain)
+    return best
+
+
+def _grid(name: str, low: float, high: float) -> Floats:
+    """Where the search for a shape begins: places evenly, sizes and rates in equal ratios."""
+    if low < 0 < high:
+        return np.linspace(0.85 * low, 0.85 * high, 9 if high - low > 0.6 else 5)
+    return np.geomspace(max(low, 0.02 * high), 0.8 * high, 12 if name == "frequency" else 4)
