@@ -40,12 +40,12 @@ def _described(quantity: Quantity) -> str:
 
 def documented(page: str) -> str:
     """The table that stands in a page."""
-    return page.split(BEGIN)[1].split(END)[0]
+    return page.partition(BEGIN)[2].partition(END)[0]
 
 
 def main() -> None:
     page = PAGE.read_text(encoding="utf-8")
-    before, after = page.split(BEGIN)[0], page.split(END)[1]
+    before, after = page.partition(BEGIN)[0], page.partition(END)[2]
     PAGE.write_text(f"{before}{BEGIN}{table()}{END}{after}", encoding="utf-8")
 
 

@@ -25,8 +25,9 @@ _JOINTS = {
 
 def scene(kind: str, time_step: float = 2e-4, centre: str = "0 0 0") -> mujoco.MjModel:
     """One body `puck` of 0.03 kg, its mass at `centre`: planar (with yaw), sliding (without), free, or on a hinge."""
+    gravity = 0 if kind == "free" else -GRAVITY
     return mujoco.MjModel.from_xml_string(f"""
-        <mujoco><option timestep="{time_step}" gravity="0 0 {0 if kind == "free" else -GRAVITY}"/>
+        <mujoco><option timestep="{time_step}" gravity="0 0 {gravity}"/>
           <worldbody><body name="puck">{_JOINTS[kind]}
             <inertial pos="{centre}" mass="0.03" diaginertia="5e-6 5e-6 9e-6"/></body></worldbody></mujoco>""")
 

@@ -46,7 +46,7 @@ def bounced(given: Exported, velocity: tuple[float, float, float]) -> Floats:
 
 
 def by_hand(speed: float, slope: float) -> float:
-    """Speed after the wall by MuJoCo's documented law of a soft contact, a = d (-b v - k d r) / (d + (1 - d) w), r < 0."""
+    """Speed after the wall by MuJoCo's law of a soft contact, a = d (-b v - k d r) / (d + (1 - d) w) at depth r < 0."""
     low, high, width = IMPEDANCE
     w = 2.0 / 3.0  # MuJoCo weighs softness with the mean of the inverse mass over three axes, of which one is locked
     r, v, h = 0.0, -speed, 1e-6

@@ -1,4 +1,4 @@
-"""Each force against closed formulas of motion, or against an integrator that knows the formula of the documentation."""
+"""Each force against closed formulas of motion, or against an integrator that knows the documented formula."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def test_the_names_that_others_build_on_are_there(channel: str) -> None:
 
 
 def test_an_unknown_effect_gets_the_nearest_name() -> None:
-    with pytest.raises(ConfigError, match="unknown effect 'magnuss'.*did you mean 'magnus'"):
+    with pytest.raises(ConfigError, match=r"unknown effect 'magnuss'.*did you mean 'magnus'"):
         effect("magnuss")
 
 
