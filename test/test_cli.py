@@ -14,24 +14,24 @@ import cv2
 import numpy as np
 import pytest
 import yaml
-from numpy.typing import NDArray
 
 from compass_ros.cells import load
 from compass_ros.cli import main
 from compass_ros.episodes import read_episode, write_episode
 from compass_ros.episodes.bag import RawMessage, scan
-from compass_ros.episodes.definitions import STRING_TYPE, embedded_definition, typestore
+from compass_ros.episodes.definitions import STRING_TYPE, embedded_definition
 from compass_ros.episodes.writer import BagWriter
 from compass_ros.types import Episode
+from test.commands.image_bags import image_bag
 from test.episodes.planted import PUCKS
 from test.nodes.recordings import record
 
 CELLS = Path(__file__).parents[1] / "config" / "cells"
-MATRIX = [600.0, 0, 320, 0, 600, 240, 0, 0, 1]
+K = [600.0, 0, 320, 0, 600, 240, 0, 0, 1]
 CAMERA = {
     "image_width": 640,
     "image_height": 480,
-    "camera_matrix": {"data": MATRIX},
+    "camera_matrix": {"data": K},
     "distortion_coefficients": {"data": [0.0] * 5},
 }
 
@@ -270,28 +270,6 @@ def test_an_output_that_cannot_be_written_is_said_before_the_work(good: Path, tm
     assert "cannot be written" in err
 
 
-def images(folder: Path, bgr: NDArray[np.uint8], name: str = "images") -> Path:
-    """A bag with two images and their camera_info."""
-    store_type = "sensor_msgs/msg/Image"
-    types = typestore().types
-    writer = BagWriter(folder / name)
-    channel = writer.add_topic("/image", embedded_definition(store_type))
-    info_type = "sensor_msgs/msg/CameraInfo"
-    info_channel = writer.add_topic("/camera_info", embedded_definition(info_type))
-    matrix, turn = np.array(MATRIX, float), np.eye(3).ravel()
-    roi = types["sensor_msgs/msg/RegionOfInterest"](0, 0, 0, 0, False)
-    height, width = bgr.shape[:2]
-    for number in range(2):
-        stamp = types["builtin_interfaces/msg/Time"](sec=number + 1, nanosec=0)
-        header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="camera")
-        info = types[info_type](header, height, width, "plumb_bob", np.zeros(5), matrix, turn, np.zeros(12), 0, 0, roi)
-        image = types[store_type](header, height, width, "bgr8", 0, 3 * width, bgr.ravel())
-        for one, kind, message in ((info_channel, info_type, info), (channel, store_type, image)):
-            writer.write(one, number + 1, number + 1, bytes(typestore().serialize_cdr(message, kind)))
-    writer.close()
-    return folder / name
-
-
 def blank_video(folder: Path) -> Path:
     path = folder / "blank.avi"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 60, (640, 480))
@@ -310,8 +288,9 @@ def camera_file(folder: Path, content: Mapping[str, object] = CAMERA) -> Path:
 def test_tracking_that_cannot_work_is_one_line(good: Path, tmp_path: Path, refused: Callable[..., str]) -> None:
     (tmp_path / "bad").mkdir()
     out, camera = tmp_path / "out", camera_file(tmp_path)
-    blank, video = images(tmp_path, np.full((480, 640, 3), 120, np.uint8)), blank_video(tmp_path)
-    small = images(tmp_path, np.zeros((48, 64, 3), np.uint8), "small")
+    gray = np.full((480, 640, 3), 120, np.uint8)
+    blank, video = image_bag(tmp_path / "blank", [(1, gray), (2, gray)], K), blank_video(tmp_path)
+    small = image_bag(tmp_path / "small", [(1, gray[:48, :64])], K)
     for words, expected in (
         ((blank,), "none of 2 images could be used: no fiducials in view"),
         ((video, "--camera", camera), "none of 3 images could be used: no fiducials in view"),
