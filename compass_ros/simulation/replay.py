@@ -69,6 +69,10 @@ def _arrange(cell: Cell, episode: Episode) -> tuple[Floats, Floats]:
         track, size = known[spec.name], QUANTITY_SIZE[spec.quantity]
         inside = np.isin(track.stamp_ns, stamps) & _seen(track)
         values[np.searchsorted(stamps, track.stamp_ns[inside]), column : column + size] = track.value[inside]
+        if np.sum(~np.isnan(values[time >= 0, column])) < 2:
+            raise DataError(
+                f"{episode.source or episode.name}: {spec.name} was not seen within {cell.duration:g} s after the command"
+            )
         if spec.quantity == "pose":
             _follow(values[:, column + 3 : column + 7])
         column += size
