@@ -69,17 +69,13 @@ def entry(model: mujoco.MjModel, field: str, of: str, where: str) -> Entry:
     if kind == "opt":
         chosen = places
     else:
-        chosen = places[_rows_of(model, kind, of, where)]
+        chosen = places[rows_of(model, kind, of, where)]
     chosen = chosen.reshape(-1, array.shape[-1] if array.ndim > 1 or kind == "opt" else 1)
     if kind == "dof" and array.ndim == 1:
         chosen = chosen.reshape(1, -1)  # index: which degree of freedom of the joint
     if index is not None and index >= chosen.shape[1]:
         raise ConfigError(f"{where}: field: {name} of '{of}' has {chosen.shape[1]} numbers, found index {index}")
     return Entry(name, chosen.ravel() if index is None else chosen[:, index])
-
-
-def _rows_of(model: mujoco.MjModel, kind: str, of: str, where: str) -> Ints:
-    return np.concatenate([rows(model, kind, one.strip(), where) for one in of.split(",")])
 
 
 def rows(model: mujoco.MjModel, kind: str, name: str, where: str) -> Ints:
@@ -98,6 +94,11 @@ def rows(model: mujoco.MjModel, kind: str, name: str, where: str) -> Ints:
         first = model.jnt_qposadr[identity]
         return np.arange(first, first + _size(model, identity, (7, 4, 1, 1)))
     return np.array([identity])
+
+
+def rows_of(model: mujoco.MjModel, kind: str, of: str, where: str) -> Ints:
+    """The same for several names, parted by commas."""
+    return np.concatenate([rows(model, kind, one.strip(), where) for one in of.split(",")])
 
 
 def names(model: mujoco.MjModel, objtype: mujoco.mjtObj) -> list[str]:
@@ -142,7 +143,7 @@ class Fields:
             used.add(name)
             if name in ELEMENT:
                 made += [
-                    Made(column, name, index or 0, int(row)) for row in _rows_of(model, ELEMENT[name], spec.of, here)
+                    Made(column, name, index or 0, int(row)) for row in rows_of(model, ELEMENT[name], spec.of, here)
                 ]
             elif name not in OUTSIDE:
                 found = entry(model, spec.field, spec.of, here)

@@ -7,16 +7,17 @@ from collections.abc import Mapping, Sequence
 import mujoco
 import numpy as np
 
+from compass_ros.cells.bindings import Command, Start, offsets, shift
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.dynamics import Sliding
-from compass_ros.cells.fields import Fields, names, parse, rows
-from compass_ros.cells.spec import ActionSpec, ObjectSpec, ParameterSpec
-from compass_ros.cells.start import STATE, TURN
+from compass_ros.cells.fields import Fields, names, rows
+from compass_ros.cells.spec import ObjectSpec, ParameterSpec
+from compass_ros.cells.start import input_names
 from compass_ros.errors import ConfigError, nearest
 from compass_ros.types import QUANTITY_SIZE, Floats, Ints
 
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS.value
-_FREE, _SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+_FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 _NUDGE_M = 1e-9
 _TABLE = {"table_friction": None, "table_creep": 0.002, "table_load": 1.0}
 """Fields of a sliding body, with what is taken where the YAML has none."""
@@ -34,17 +35,15 @@ class Mjcf:
                 raise ConfigError(f"{self._where}: {p.name}: field: missing; say which field of the scene it is")
         self._fields = Fields(self._model, list(enumerate(cell.spec.parameters)), self._where)
         self._first = _first_positions(self._model)
-        self._commands = [_Command(self._model, i, a, self._where) for i, a in enumerate(cell.spec.action)]
-        self._starts = self._bound_starts()
+        self._commands = [Command(self._model, i, a, self._where) for i, a in enumerate(cell.spec.action)]
+        self._starts = _starts(cell, self._model)
         self._columns = np.concatenate([_columns(self._model, o, self._where) for o in cell.objects]).astype(np.int64)
-        self._sliding = _table_fields(cell.spec.parameters)
-        for body in self._sliding:
-            rows(self._model, "body", body, self._where)
-            if "table_friction" not in self._sliding[body]:
-                raise ConfigError(f"{self._where}: body '{body}' has a table_creep or table_load but no table_friction")
-        self._offsets = self._offset_columns()
-        self._begins = [(i, *_begin(self._model, p, self._where)) for i, p in enumerate(cell.spec.parameters)
-                        if p.field.startswith("start_")]  # fmt: skip
+        self._sliding = _table_fields(self._model, cell.spec.parameters, self._where)
+        numbered = list(enumerate(cell.spec.parameters))
+        self._shifts = [shift(self._model, i, p, self._where) for i, p in numbered if p.field.startswith("start_")]
+        biased = [(i, p) for i, p in numbered if p.field.startswith("observed_offset")]
+        columns = {name: start.column for name, start in self._starts.items()}
+        self._offsets = [offset for i, p in biased for offset in offsets(cell, i, p, columns)]
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -56,12 +55,16 @@ class Mjcf:
     def start(self, values: Floats, inputs: Floats) -> tuple[Floats, Floats]:
         positions = np.tile(self._first, (len(values), 1))
         velocities = np.zeros((len(values), self._model.nv))
-        for start in self._starts:
-            start.write(inputs, positions, velocities)
+        true = inputs.copy()
+        for offset in self._offsets:
+            if offset.first is not None:
+                true[:, offset.first] -= values[:, offset.parameter]
+        for start in self._starts.values():
+            start.write(true, positions, velocities)
         for command in self._commands:
             command.begin(inputs, positions, velocities)
-        for parameter, of_positions, places in self._begins:
-            (positions if of_positions else velocities)[:, places] += values[:, parameter, None]
+        for s in self._shifts:
+            (positions if s.of_positions else velocities)[:, s.places] += values[:, s.parameter, None]
         return positions, velocities
 
     def controls(self, values: Floats, inputs: Floats, steps: int) -> Floats:
@@ -88,135 +91,21 @@ class Mjcf:
         if not self._offsets:
             return positions
         moved = positions.copy()
-        for column, parameter in self._offsets:
-            moved[:, :, column] += values[:, parameter, None]
+        for offset in self._offsets:
+            moved[:, :, offset.column] += values[:, offset.parameter, None]
         return moved
 
     def poses(self, values: Floats, positions: Floats) -> Mapping[str, Floats]:
         return {}  # which bodies move in a plane is not known here
 
-    def _bound_starts(self) -> list[_Start]:
-        out, column = [], len(self._cell.action)
-        for spec in self._cell.spec.start:
-            obj = next(o for o in self._cell.objects if o.name == spec.object)
-            out.append(_Start(self._model, obj, column, self._where))
-            column += len(STATE[obj.quantity]) + (len(TURN) if obj.quantity == "pose" else 0)
-        return out
 
-    def _offset_columns(self) -> list[tuple[int, int]]:
-        """(observed column, parameter) of each bias."""
-        out = []
-        for i, p in enumerate(self._cell.spec.parameters):
-            name, index = parse(p.field, f"{self._where}: {p.name}")
-            if name != "observed_offset":
-                continue
-            chosen = [o.name for o in self._cell.objects] if not p.of else [one.strip() for one in p.of.split(",")]
-            at = 0
-            for o in self._cell.objects:
-                if o.name in chosen:
-                    size = QUANTITY_SIZE[o.quantity]
-                    if (index or 0) >= size:
-                        raise ConfigError(
-                            f"{self._where}: {p.name}: '{o.name}' has {size} numbers, found index {index}"
-                        )
-                    out.append((at + (index or 0), i))
-                at += QUANTITY_SIZE[o.quantity]
-            unknown = set(chosen) - {o.name for o in self._cell.objects}
-            if unknown:
-                raise ConfigError(f"{self._where}: {p.name}: of: unknown object {sorted(unknown)}")
-        return out
-
-
-class _Command:
-    """One field of an action."""
-
-    def __init__(self, model: mujoco.MjModel, column: int, spec: ActionSpec, where: str) -> None:
-        here = f"{where}: action {spec.name}"
-        name, _, index = spec.field.rstrip("]").partition("[")
-        if name not in ("qpos", "qvel", "ctrl") or (index and not index.isdigit()):
-            raise ConfigError(f"{here}: field: expected qpos[i], qvel[i] or ctrl, found '{spec.field}'")
-        kind = {"qpos": "qpos", "qvel": "dof", "ctrl": "actuator"}[name]
-        places = rows(model, kind, spec.of, here)
-        if int(index or 0) >= len(places):
-            raise ConfigError(f"{here}: field: '{spec.of}' has {len(places)} numbers, found index {index}")
-        self._name, self._column, self._place = name, column, int(places[int(index or 0)])
-        self._from, self._until = spec.from_s, spec.until_s
-
-    def begin(self, inputs: Floats, positions: Floats, velocities: Floats) -> None:
-        if self._name != "ctrl":
-            (positions if self._name == "qpos" else velocities)[:, self._place] = inputs[:, self._column]
-
-    def hold(self, inputs: Floats, time: Floats, controls: Floats) -> None:
-        if self._name == "ctrl":
-            now = (time >= self._from - 1e-9) & (time < self._until - 1e-9)
-            controls[:, now, self._place] += inputs[:, self._column, None]
-
-
-class _Start:
-    """The first state of one object, from the inputs."""
-
-    def __init__(self, model: mujoco.MjModel, obj: ObjectSpec, column: int, where: str) -> None:
-        self._quantity, self._column = obj.quantity, column
-        here, name = f"{where}: start: {obj.name}", obj.body or obj.name
-        if obj.quantity == "joint":
-            self._qpos, self._qvel = (int(rows(model, kind, name, here)[0]) for kind in ("qpos", "dof"))
-            return
-        body = int(rows(model, "body", name, here)[0])
-        joints = range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body])
-        kinds = [int(model.jnt_type[j]) for j in joints]
-        self._free = kinds == [_FREE]
-        if not kinds or not (self._free or (set(kinds) == {_SLIDE} and obj.quantity != "pose")):
-            wanted = "a free joint" if obj.quantity == "pose" else "a free joint or slide joints"
-            raise ConfigError(f"{here}: body '{name}' needs {wanted} to start where it was measured")
-        self._qpos, self._qvel = int(model.jnt_qposadr[joints[0]]), int(model.jnt_dofadr[joints[0]])
-        self._axes, self._rest = _frame(model, body, joints)
-
-    def write(self, inputs: Floats, positions: Floats, velocities: Floats) -> None:
-        state = inputs[:, self._column :]
-        if self._quantity == "joint":
-            positions[:, self._qpos], velocities[:, self._qvel] = state[:, 0], state[:, 1]
-            return
-        size = min(QUANTITY_SIZE[self._quantity], 3)
-        at = self._qpos + np.arange(size)
-        if self._quantity == "pose":
-            positions[:, at] = state[:, :3]
-            positions[:, self._qpos + 3 : self._qpos + 7] = _turned(state[:, 3:7], state[:, 13:16])
-            velocities[:, self._qvel : self._qvel + 6] = state[:, 7:13]
-        elif self._free:
-            positions[:, at] = state[:, :size]
-            velocities[:, self._qvel + np.arange(size)] = state[:, size : 2 * size]
-        else:
-            axes = self._axes[:, :size]
-            slides = np.arange(len(axes))
-            positions[:, self._qpos + slides] = (state[:, :size] - self._rest[:size]) @ axes.T
-            velocities[:, self._qvel + slides] = state[:, size : 2 * size] @ axes.T
-
-
-def _begin(model: mujoco.MjModel, spec: ParameterSpec, where: str) -> tuple[bool, Ints]:
-    """Whether a parameter shifts first positions (or velocities), and which."""
-    name, index = parse(spec.field, f"{where}: {spec.name}")
-    of_positions = name == "start_qpos"
-    places = rows(model, "qpos" if of_positions else "dof", spec.of, f"{where}: {spec.name}")
-    if (index or 0) >= len(places):
-        raise ConfigError(f"{where}: {spec.name}: field: '{spec.of}' has {len(places)} numbers, found index {index}")
-    return of_positions, places if index is None else places[[index]]
-
-
-def _frame(model: mujoco.MjModel, body: int, joints: range) -> tuple[Floats, Floats]:
-    """(J, 3) axes of slide joints in the world and (3,) place of the body, both with all joints at zero."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    return data.xaxis[list(joints)].copy(), data.xpos[body].copy()
-
-
-def _turned(quaternion: Floats, vector: Floats) -> Floats:
-    """(B, 4) quaternions, normalised, then turned by (B, 3) rotation vectors in the body's frame."""
-    unit: Floats = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-    out = np.zeros(unit.shape)
-    for i, (q, v) in enumerate(zip(unit, vector, strict=True)):
-        angle, turn = float(np.linalg.norm(v)), np.zeros(4)
-        mujoco.mju_axisAngle2Quat(turn, v / angle if angle else np.array([0.0, 0.0, 1.0]), angle)
-        mujoco.mju_mulQuat(out[i], q, turn)
+def _starts(cell: Cell, model: mujoco.MjModel) -> dict[str, Start]:
+    """First states by object, in the order of the inputs."""
+    out, column = {}, len(cell.action)
+    for spec in cell.spec.start:
+        obj = next(o for o in cell.objects if o.name == spec.object)
+        out[obj.name] = Start(model, obj, column, str(cell.path))
+        column += len(input_names(spec, obj.quantity))
     return out
 
 
@@ -226,12 +115,16 @@ def _first_positions(model: mujoco.MjModel) -> Floats:
     return np.asarray(model.key("start").qpos if "start" in keys else model.qpos0, np.float64) + 0.0
 
 
-def _table_fields(parameters: Sequence[ParameterSpec]) -> dict[str, dict[str, int]]:
-    """body -> field -> parameter, of the bodies that slide on a table."""
+def _table_fields(model: mujoco.MjModel, parameters: Sequence[ParameterSpec], where: str) -> dict[str, dict[str, int]]:
+    """body -> field -> parameter, of the bodies that slide on a table. Raises ConfigError."""
     out: dict[str, dict[str, int]] = {}
     for i, p in enumerate(parameters):
         if p.field in _TABLE:
+            rows(model, "body", p.of, f"{where}: {p.name}")
             out.setdefault(p.of, {})[p.field] = i
+    for body, fields in out.items():
+        if "table_friction" not in fields:
+            raise ConfigError(f"{where}: body '{body}' has a table_creep or table_load but no table_friction")
     return out
 
 

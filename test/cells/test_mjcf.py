@@ -212,3 +212,17 @@ def test_an_episode_without_a_start_is_refused(tmp_path: Path) -> None:
         cell.inputs(episode({}))
     with pytest.raises(DataError, match="expected 7 or 13 numbers"):
         cell.inputs(episode({"cube": (1.0, 2.0)}))
+
+
+def test_a_biased_encoder_measures_the_first_angle_with_its_bias(tmp_path: Path) -> None:
+    bias = parameter("encoder@sensing@offset", "observed_offset[0]", "joint1", width=0.1)
+    later = parameter("arm1@actuation@push", "start_qvel", "joint1", width=0.1)
+    starts = [{"object": "joint1"}, {"object": "joint2"}]
+    cell = written(tmp_path, PENDULUM, content(ARMS, [bias, later], start=starts))
+    inputs = cell.inputs(episode({"joint1": (0.6, 0.0), "joint2": (0.0, 0.0)}))
+    values = np.array([[0.1, 0.0], [0.0, 0.0], [0.0, 2.0]])
+    seen = Simulator(cell, threads=1).observe(values, np.tile(inputs, (3, 1)), np.tile(TIME, (3, 1)))
+    swing = by_hand(PENDULUM, np.array([0.5, 0.0]), np.zeros(2), 490)[::10]
+    assert seen[0, 0, 0] == pytest.approx(0.6), "it starts where it was measured"
+    assert np.abs(seen[0, :, 0] - 0.1 - swing[:, 0]).max() < 1e-9
+    assert (seen[2, 1, 0] - seen[1, 1, 0]) / 0.01 == pytest.approx(2.0, rel=0.05)
