@@ -15,12 +15,12 @@ PACKAGE = ROOT / "compass_ros"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 STEPS = ("cells", "tracking", "episodes", "simulation", "calibration", "discovery", "policy", "reporting")
-JOINS = {"pipeline": 3, "results": 3, "bench": 4, "demo": 4, "commands": 5, "cli": 6, "nodes": 6}
+JOINS = {"pipeline": 3, "results": 3, "concealed": 3, "bench": 4, "demo": 4, "commands": 5, "cli": 6, "nodes": 6}
 LAYERS = {"types": 0, "errors": 0, "config": 1, **dict.fromkeys(STEPS, 2), **JOINS}
 """A module imports from lower layers, or from its own part."""
 
 HOMES = {
-    ("mujoco", "robosuite"): {"simulation", "cells"},
+    ("mujoco", "robosuite"): {"simulation", "cells", "concealed"},
     ("torch",): {"calibration", "policy"},
     ("cv2",): {"tracking"},
     ("rosbags", "mcap", "mcap_ros2"): {"episodes"},

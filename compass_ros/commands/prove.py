@@ -1,0 +1,76 @@
+"""`compass prove`: many sealed worlds, each calibrated blindly and then unsealed, as one table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from compass_ros.concealed.proof.lines import Key, Line
+
+
+def add_to(app: typer.Typer) -> None:
+    app.command()(prove)
+
+
+def prove(
+    worlds: Annotated[int, typer.Option(min=1, help="of each suite")] = 120,
+    suite: Annotated[
+        list[str] | None,
+        typer.Option(help="main, small (0.5 mm), tracker (its noise) or like (the library's formulas)"),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="results, one line a world")] = Path("proof/results.jsonl"),
+    jobs: Annotated[int, typer.Option(min=1, help="worlds at a time")] = 1,
+    threads: Annotated[int, typer.Option(min=1, help="threads of the simulator for each world")] = 1,
+    method: Annotated[str, typer.Option(help="method of the calibration; others stand beside ours")] = "default",
+    first_seed: Annotated[int | None, typer.Option(min=0, help="seed of the first world; else the suite's own")] = None,
+    table: Annotated[bool, typer.Option("--table", help="only print the table of the results that are there")] = False,
+    page: Annotated[Path | None, typer.Option(help="Markdown file whose table is replaced")] = None,
+) -> None:
+    """Conceal, calibrate blindly, unseal, count. A run that was stopped goes on where it was."""
+    from compass_ros.concealed.proof import lines
+    from compass_ros.concealed.proof.campaign import Plan, in_processes
+    from compass_ros.concealed.proof.campaign import prove as campaign
+    from compass_ros.concealed.proof.one_world import SUITES
+    from compass_ros.concealed.proof.page import groups, write_page
+    from compass_ros.errors import ConfigError, nearest
+
+    suites = tuple(suite or ("main",))
+    for name in suites:
+        if name not in SUITES:
+            raise ConfigError(f"unknown suite '{name}'; known: {', '.join(SUITES)}{nearest(name, SUITES)}")
+    if not table:
+        campaign(Plan(suites, worlds, method, first_seed), out, jobs, _tell, in_processes(threads))
+    found = list(lines.read(out).values())
+    for (name, by), among in groups(found).items():
+        _print(f"{name}, method {by}: {len(among)} worlds", among)
+    if page:
+        write_page(page, found)
+
+
+def _tell(key: Key, line: Line, done: int, total: int) -> None:
+    marks = line.get("marks")
+    if marks:
+        truth = " + ".join(marks["truth"]) or "nothing"
+        names = ", ".join(marks["found"])
+        said = f"{marks['verdict']}{': ' + names if names else ''}"
+        text = f"{'right' if marks['right'] else 'WRONG'}  true: {truth}; said: {said}"
+    else:
+        text = f"FAILED {line['error']}"
+    seconds = (line.get("seconds") or {}).get("calibrate", 0.0)
+    typer.echo(f"[{done}/{total}] {key.suite} {key.seed}  {seconds:.0f} s  {text}")
+
+
+def _print(title: str, among: list[Line]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from compass_ros.concealed.proof.statistics import table
+
+    shown = Table("", "to reach", "reached", "95 % interval", "of", "", title=title)
+    for row in table(among):
+        verdict = {True: "yes", False: "no", None: ""}[row.reached]
+        shown.add_row(row.what, row.bar, row.value, row.interval, row.count, verdict)
+    Console().print(shown)

@@ -1,0 +1,1 @@
+"""The proof: many sealed worlds, each calibrated blindly, unsealed and counted."""

@@ -1,0 +1,81 @@
+"""Many worlds, several at a time, into one results file; stopped at any moment, it goes on from there."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+
+from compass_ros.concealed.proof import lines
+from compass_ros.concealed.proof.lines import Key, Line
+from compass_ros.concealed.proof.one_world import SUITES, run
+
+RunWorld = Callable[[Key], dict[str, object]]
+Tell = Callable[[Key, Line, int, int], None]
+"""A finished world, its line, how many are done and how many there were to do."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Which worlds."""
+
+    suites: tuple[str, ...]
+    worlds: int
+    """Of each suite."""
+    method: str = "default"
+    first_seed: int | None = None
+    """None: the suite's own."""
+
+    def worlds_to_prove(self) -> list[Key]:
+        """In an order in which a run that is stopped has some of each suite."""
+        starts = {s: SUITES[s].first_seed if self.first_seed is None else self.first_seed for s in self.suites}
+        return [Key(s, starts[s] + i, self.method) for i in range(self.worlds) for s in self.suites]
+
+
+def in_processes(threads: int) -> RunWorld:
+    """A world by the real command line."""
+    return lambda key: run(SUITES[key.suite], key.seed, key.method, threads)
+
+
+def prove(plan: Plan, path: Path, jobs: int, tell: Tell, run_world: RunWorld) -> None:
+    """Run what is missing or by an older method, `jobs` worlds at a time; the file is whole after each of them."""
+    known = lines.read(path)
+    made_by = {
+        "method_sources": lines.sources(lines.METHOD),
+        "world_sources": lines.sources(lines.WORLDS),
+        "commit": commit(),
+    }
+    todo = [
+        key
+        for key in plan.worlds_to_prove()
+        if lines.stale(known.get(key), str(made_by["method_sources"]), str(made_by["world_sources"]))
+    ]
+    with ThreadPoolExecutor(jobs) as pool:
+        running: dict[Future[dict[str, object]], Key] = {pool.submit(run_world, key): key for key in todo}
+        try:
+            for done, future in enumerate(as_completed(running), 1):
+                key = running[future]
+                about = {"suite": key.suite, "seed": key.seed, "method": key.method, "jobs": jobs}
+                known[key] = about | made_by | future.result()
+                lines.write(path, known.values())
+                tell(key, known[key], done, len(todo))
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+def chosen(found: Sequence[Line], plan: Plan) -> list[Line]:
+    """The lines of a plan."""
+    wanted = set(plan.worlds_to_prove())
+    return [line for line in found if lines.key(line) in wanted]
+
+
+def commit() -> str:
+    """The commit of the sources, with a + where files differ from it; 'unknown' outside of a repository."""
+    asked = ["git", "-C", str(lines.PACKAGE), "describe", "--always", "--abbrev=12", "--dirty=+", "--exclude=*"]
+    try:
+        done = subprocess.run(asked, capture_output=True, text=True, check=False)
+    except FileNotFoundError:
+        return "unknown"
+    return done.stdout.strip() if done.returncode == 0 else "unknown"

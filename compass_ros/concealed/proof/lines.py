@@ -1,0 +1,72 @@
+"""The results file: one JSON object a line, one line a world and method. The repository keeps it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from compass_ros.errors import ConfigError
+from compass_ros.reporting.atomic import write_text
+
+Line = Mapping[str, Any]
+PACKAGE = Path(__file__).parents[2]
+METHOD = ("calibration", "discovery", "simulation", "cells", "pipeline.py", "results.py", "types.py", "config.py")
+WORLDS = ("concealed", "cells")
+
+
+@dataclass(frozen=True)
+class Key:
+    """What a line is about."""
+
+    suite: str
+    seed: int
+    method: str
+
+
+def key(line: Line) -> Key:
+    return Key(str(line["suite"]), int(line["seed"]), str(line["method"]))
+
+
+def read(path: Path) -> dict[Key, Line]:
+    """All lines; the last one of a world counts. No file: none. Raises ConfigError with the number of a bad line."""
+    if not path.exists():
+        return {}
+    found: dict[Key, Line] = {}
+    for number, text in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        try:
+            line = json.loads(text)
+            found[key(line)] = line
+        except (ValueError, KeyError, TypeError) as error:
+            raise ConfigError(f"{path}: line {number}: not a result of a world: {error}") from error
+    return found
+
+
+def write(path: Path, lines: Iterable[Line]) -> None:
+    """Replace the file, whole or not at all; sorted, so that a version control shows what changed."""
+    ordered = sorted(lines, key=lambda line: (line["suite"], line["method"], line["seed"]))
+    write_text(path, "".join(json.dumps(line, sort_keys=True) + "\n" for line in ordered))
+
+
+def sources(parts: Iterable[str]) -> str:
+    """Hash of the source files of these parts of the package: 16 hexadecimal digits."""
+    total = hashlib.sha256()
+    for part in parts:
+        root = PACKAGE / part
+        files = [root] if root.is_file() else sorted(p for p in root.rglob("*") if p.suffix in (".py", ".c"))
+        for file in files:
+            total.update(str(file.relative_to(PACKAGE)).encode() + b"\0" + file.read_bytes())
+    return total.hexdigest()[:16]
+
+
+def stale(line: Line | None, method_sources: str, world_sources: str) -> bool:
+    """Whether a world has to be run (again): never run, failed to run, or by other sources."""
+    return (
+        line is None
+        or line.get("error") is not None
+        or line["method_sources"] != method_sources
+        or line["world_sources"] != world_sources
+    )

@@ -1,0 +1,116 @@
+"""The table of the proof: what had to be reached, what was, and how sure that is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import binomtest, bootstrap
+
+from compass_ros.concealed.proof.lines import Line
+
+_LEVEL = 0.95
+_CENTRE_M = 0.02
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table."""
+
+    what: str
+    bar: str
+    value: str
+    interval: str
+    count: str
+    reached: bool | None
+    """None: nothing to judge by."""
+
+
+def table(found: Sequence[Line]) -> list[Row]:
+    """The rows for the worlds of one suite and method. A world whose run failed counts as wrong, never as missing."""
+    one, two, none, outside = ([x for x in found if _kind(x) == kind] for kind in ("one", "two", "none", "outside"))
+    alone = [x for x in one if _mark(x, "first_right") is not None and _mark(x, "right")]
+    checks = [c for x in found for c in _marks(x).get("parameters", ())]
+    centres = [_mark(x, "centre_error_m") for x in one if _mark(x, "right") and _mark(x, "centre_error_m") is not None]
+    gains = [_mark(x, "gain") for x in one + two if _mark(x, "gain") is not None]
+    return [
+        _share("one effect, named right or within its class", one, "right", 0.95),
+        _share("of these, first name right where the class has one member", alone, "first_right", 0.95),
+        _share("two effects, both named or within their classes", two, "right", 0.75),
+        _share("nothing missing: none", none, "right", 0.97),
+        _share("outside the library: unknown", outside, "right", 0.90),
+        _where("outside the library: object, phase and channel right", outside, 0.90),
+        _share("outside the library: misnamed", outside, "misnamed", 0.03, most=True),
+        _share("one effect: misnamed", one, "misnamed", 0.03, most=True),
+        _where("one effect: object, phase and channel right", one, 0.97),
+        _proportion(f"centre within {100 * _CENTRE_M:.0f} cm", [c <= _CENTRE_M for c in centres], 0.97),
+        _median("parameters of effects: median error", [c["error"] for c in checks], 0.05, most=True),
+        _between("parameters of effects: 90 % intervals hold the truth", [c["covered"] for c in checks], 0.80, 0.97),
+        _median("share of the excess held-out error removed, median", gains, 0.9),
+        _seconds("calibration and discovery, median [s]", found, 90.0),
+    ]
+
+
+def _marks(line: Line) -> dict[str, Any]:
+    return dict(line.get("marks") or {})
+
+
+def _mark(line: Line, name: str) -> Any:
+    return _marks(line).get(name)
+
+
+def _kind(line: Line) -> str:
+    return str(_marks(line).get("kind", line.get("kind", "")))
+
+
+def _share(what: str, among: Sequence[Line], mark: str, bar: float, most: bool = False) -> Row:
+    return _proportion(what, [bool(_mark(line, mark)) for line in among], bar, most)
+
+
+def _where(what: str, among: Sequence[Line], bar: float) -> Row:
+    names = ("object_right", "phase_right", "channel_right")
+    return _proportion(what, [all(_mark(line, name) for name in names) for line in among], bar)
+
+
+def _proportion(what: str, outcomes: Sequence[bool], bar: float, most: bool = False) -> Row:
+    """Share of True with Wilson's interval."""
+    text = f"{'<=' if most else '>='} {100 * bar:.0f} %"
+    if not outcomes:
+        return Row(what, text, "-", "-", "0", None)
+    hits, count = int(np.sum(outcomes)), len(outcomes)
+    interval = binomtest(hits, count).proportion_ci(_LEVEL, method="wilson")
+    share = hits / count
+    reached = share <= bar if most else share >= bar
+    limits = f"{100 * interval.low:.0f} to {100 * interval.high:.0f} %"
+    return Row(what, text, f"{100 * share:.0f} %", limits, f"{hits} of {count}", reached)
+
+
+def _between(what: str, outcomes: Sequence[bool], low: float, high: float) -> Row:
+    row = _proportion(what, outcomes, low)
+    share = float(np.mean(outcomes)) if outcomes else np.nan
+    reached = bool(low <= share <= high) if outcomes else None
+    return Row(what, f"{100 * low:.0f} to {100 * high:.0f} %", row.value, row.interval, row.count, reached)
+
+
+def _median(what: str, values: Sequence[float], bar: float, most: bool = False) -> Row:
+    """Median with a bootstrap interval; shares as per cent."""
+    return _of_medians(what, values, bar, most, lambda x: f"{100 * x:.1f} %")
+
+
+def _seconds(what: str, among: Sequence[Line], bar: float) -> Row:
+    seconds = [line["seconds"]["calibrate"] for line in among if line.get("seconds")]
+    return _of_medians(what, seconds, bar, True, lambda x: f"{x:.0f}")
+
+
+def _of_medians(what: str, values: Sequence[float], bar: float, most: bool, shown: Callable[[float], str]) -> Row:
+    text = f"{'<=' if most else '>='} {shown(bar)}"
+    if not values:
+        return Row(what, text, "-", "-", "0", None)
+    middle = float(np.median(values))
+    limits = "-"
+    if len(set(values)) > 1:
+        spread = bootstrap((np.asarray(values),), np.median, confidence_level=_LEVEL, method="percentile", rng=0)
+        limits = f"{shown(spread.confidence_interval.low)} to {shown(spread.confidence_interval.high)}"
+    return Row(what, text, shown(middle), limits, str(len(values)), middle <= bar if most else middle >= bar)
