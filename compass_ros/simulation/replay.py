@@ -70,9 +70,8 @@ def _arrange(cell: Cell, episode: Episode) -> tuple[Floats, Floats]:
         inside = np.isin(track.stamp_ns, stamps) & _seen(track)
         values[np.searchsorted(stamps, track.stamp_ns[inside]), column : column + size] = track.value[inside]
         if np.sum(~np.isnan(values[time >= 0, column])) < 2:
-            raise DataError(
-                f"{episode.source or episode.name}: {spec.name} was not seen within {cell.duration:g} s after the command"
-            )
+            where = episode.source or episode.name
+            raise DataError(f"{where}: {spec.name} was not seen within {cell.duration:g} s after the command")
         if spec.quantity == "pose":
             _follow(values[:, column + 3 : column + 7])
         column += size

@@ -1,0 +1,70 @@
+"""Noise found in recordings without any simulator: still frames, flight, outliers, gaps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from compass_ros.calibration.noise import measure_noise
+from compass_ros.types import Floats
+
+RATE = 60.0
+EPISODES, STILL, MOVING = 12, 60, 120
+
+
+def recording(sigma: Floats, correlation: float = 0.0, still: int = STILL, seed: int = 0) -> tuple[Floats, Floats]:
+    """Times and measurements: at rest before the command, then a parabola in each column; AR(1) noise."""
+    frames = still + MOVING
+    time = np.tile((np.arange(frames) - still) / RATE, (EPISODES, 1))
+    moving = np.clip(time, 0, None)[:, :, None]
+    rng = np.random.default_rng(seed)
+    motion = rng.normal(0, 0.3, (EPISODES, 1, len(sigma))) * moving - 0.1 * moving**2
+    white = rng.normal(size=motion.shape)
+    noise = np.empty_like(white)
+    noise[:, 0] = white[:, 0]
+    for f in range(1, frames):
+        noise[:, f] = correlation * noise[:, f - 1] + np.sqrt(1 - correlation**2) * white[:, f]
+    return time, rng.normal(0, 0.1, (EPISODES, 1, len(sigma))) + motion + noise * sigma
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.4, 0.7])
+def test_sigma_and_correlation_are_found_from_still_frames(correlation: float) -> None:
+    sigma = np.array([0.5e-3, 1e-3, 0.5e-3, 2e-3])
+    found = measure_noise(*recording(sigma, correlation), expected=9.0)
+    np.testing.assert_allclose(found.sigma, sigma, rtol=0.12)
+    assert found.correlation == pytest.approx(correlation, abs=0.06)
+    assert found.correlation_time == pytest.approx((1 + correlation) / (1 - correlation), rel=0.25)
+
+
+def test_without_still_frames_the_flight_says_it() -> None:
+    sigma = np.array([1e-3, 3e-3])
+    found = measure_noise(*recording(sigma, still=0), expected=9.0)
+    np.testing.assert_allclose(found.sigma, sigma, rtol=0.1)
+
+
+def test_with_neither_the_expected_noise_is_taken() -> None:
+    time, measured = recording(np.array([1e-3]), still=0)
+    found = measure_noise(time[:, :5], measured[:, :5], expected=0.004)
+    np.testing.assert_array_equal(found.sigma, [0.004])
+    assert found.correlation == 0
+
+
+def test_outliers_and_gaps_hardly_matter() -> None:
+    time, measured = recording(np.array([1e-3, 1e-3]), 0.4)
+    rng = np.random.default_rng(1)
+    measured[rng.random(measured.shape) < 0.007] += 0.008
+    measured[rng.random(measured.shape[:2]) < 0.05] = np.nan
+    found = measure_noise(time, measured, expected=9.0)
+    np.testing.assert_allclose(found.sigma, 1e-3, rtol=0.15)
+    assert found.correlation == pytest.approx(0.4, abs=0.12)
+
+
+def test_a_tracker_that_is_worse_in_motion_is_judged_in_motion() -> None:
+    time, measured = recording(np.array([0.3e-3]))
+    measured[:, STILL:] += np.random.default_rng(2).normal(0, 2e-3, (EPISODES, MOVING, 1))
+    found = measure_noise(time, measured, expected=9.0).sigma[0]
+    assert 0.9e-3 < found < 2.2e-3  # a median over all frames, of which a third are still
+
+
+def test_perfect_recordings_keep_sigma_positive() -> None:
+    assert (measure_noise(*recording(np.zeros(2)), expected=9.0).sigma > 0).all()
