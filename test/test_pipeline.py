@@ -1,0 +1,137 @@
+"""The method as a whole: what is held out stays out, and the same bags give the same bits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compass_ros.config import CalibrationConfig
+from compass_ros.errors import DataError
+from compass_ros.pipeline import calibrate, split
+from compass_ros.simulation.replay import Replay, recordings
+from compass_ros.types import Episode, Progress, Result, Track
+from test.simulation.table import actions, cell, simulator, values
+
+START = 1_700_000_000_000_000_000
+NOISE = 5e-4
+TRUTH = {"pusher@actuation@vel_discount": 0.85, "puck2@dyna@friction_sliding": 0.03, "env@camera@bias_x": 0.03}
+CONFIG = CalibrationConfig(method="random", rollouts=32, discover=False, seed=3)
+FIELDS = ("x", "y", "angle", "velocity")
+
+
+def named(*names: str) -> list[Episode]:
+    return [Episode(name, "air_hockey", "", {}, START + i, ()) for i, name in enumerate(names)]
+
+
+@pytest.fixture(scope="module")
+def episodes() -> list[Episode]:
+    """Six shots with hidden parameters, half a second still before each, at 60 Hz."""
+    shots = actions(6, seed=9)
+    stamps = START + np.round(np.arange(-0.5, 2.5, 1 / 60) * 1e9).astype(np.int64)
+    times = np.tile((stamps - START) * 1e-9, (len(shots), 1))
+    seen = simulator().observe(values(TRUTH, len(shots)), shots, times)
+    seen = seen + np.random.default_rng(0).normal(0, NOISE, seen.shape)
+    return [
+        Episode(
+            name=f"shot{i}",
+            cell="air_hockey",
+            cell_hash=cell().hash,
+            action=dict(zip(FIELDS, shots[i].tolist(), strict=True)),
+            start_ns=START,
+            tracks=tuple(Track(f"puck{k + 1}", "xy", stamps, seen[i][:, 2 * k : 2 * k + 2]) for k in range(2)),
+        )
+        for i in range(len(shots))
+    ]
+
+
+@pytest.fixture(scope="module")
+def result(episodes: list[Episode]) -> Result:
+    return calibrate(episodes, cell(), CONFIG)[0]
+
+
+def found(result: Result) -> list[float]:
+    return [row.value for row in result.parameters]
+
+
+def test_the_split_depends_on_names_and_seed_alone() -> None:
+    twelve = named(*(f"shot{i}" for i in range(12)))
+    fit, held_out = split(twelve, CONFIG)
+    assert len(held_out) == 3
+    assert sorted(e.name for e in fit + held_out) == sorted(e.name for e in twelve)
+    for order in (twelve[::-1], [replace(e, source=f"/elsewhere/{e.name}") for e in twelve]):
+        again = split(order, CONFIG)
+        assert [[e.name for e in part] for part in again] == [[e.name for e in part] for part in (fit, held_out)]
+    others = {tuple(e.name for e in split(twelve, replace(CONFIG, seed=seed))[1]) for seed in range(6)}
+    assert len(others) > 3
+
+
+def test_an_episode_more_leaves_most_of_the_held_out_ones_where_they_are() -> None:
+    twelve = named(*(f"shot{i}" for i in range(12)))
+    before = {e.name for e in split(twelve, CONFIG)[1]}
+    after = {e.name for e in split(twelve + named("another"), CONFIG)[1]}
+    assert len(before - after) <= 1
+
+
+@pytest.mark.parametrize(("share", "count"), [(0.0, 0), (0.25, 2), (0.5, 4)])
+def test_the_share_is_kept(share: float, count: int) -> None:
+    eight = named(*(f"shot{i}" for i in range(8)))
+    assert len(split(eight, replace(CONFIG, held_out_share=share))[1]) == count
+
+
+def test_a_single_episode_is_fitted() -> None:
+    fit, held_out = split(named("only"), CONFIG)
+    assert ([e.name for e in fit], held_out) == (["only"], [])
+    with pytest.raises(DataError, match="no episodes"):
+        split([], CONFIG)
+
+
+def test_what_is_held_out_is_never_fitted(episodes: list[Episode], result: Result) -> None:
+    """Spoil the held-out recordings: not one bit of the values moves, while the held-out gap does."""
+    spoilt = [
+        replace(e, tracks=tuple(replace(t, value=t.value + 0.05) for t in e.tracks)) if e.name in result.held_out else e
+        for e in episodes
+    ]
+    again = calibrate(spoilt, cell(), CONFIG)[0]
+    assert result.held_out
+    assert set(result.fit) | set(result.held_out) == {e.name for e in episodes}
+    assert found(again) == found(result)
+    assert again.gap["calibrated"]["fit"] == result.gap["calibrated"]["fit"]
+    assert again.gap["calibrated"]["held_out"].rmse_m > result.gap["calibrated"]["held_out"].rmse_m + 0.01
+
+
+def test_the_same_bags_in_any_order_on_any_threads_give_the_same_bits(episodes: list[Episode], result: Result) -> None:
+    again = calibrate(episodes[::-1], cell(), replace(CONFIG, threads=1))[0]
+    assert found(again) == found(result)
+    assert again.gap == result.gap
+    assert (again.fit, again.held_out) == (result.fit, result.held_out)
+
+
+def test_the_noise_floor_is_that_of_the_recordings(result: Result) -> None:
+    """Root mean square distance of two coordinates with that noise each."""
+    assert result.noise_floor_m == pytest.approx(NOISE * np.sqrt(2), rel=0.1)
+
+
+def test_the_result_holds_what_the_report_draws(result: Result) -> None:
+    assert [row.name for row in result.parameters] == [p.name for p in cell().parameters]
+    assert {r.episode for r in result.replays if r.held_out} == set(result.held_out)
+    assert result.mismatch.verdict == "not_evaluated"
+    nominal = result.gap["nominal"]["fit"]
+    assert nominal.d["puck2"] > 1.0
+    drawn = result.replays[0].tracks[0]
+    assert drawn.real.shape == drawn.nominal.shape == drawn.calibrated.shape
+    assert drawn.with_effects is None
+
+
+def test_the_values_of_the_truth_reach_the_noise_floor(episodes: list[Episode], result: Result) -> None:
+    """The gap that is reported is zero but for noise where nothing is wrong: a check of the yardstick itself."""
+    at_truth = Replay(simulator(), recordings(cell(), episodes)).gap(values(TRUTH)[0])
+    assert at_truth.rmse_m == pytest.approx(result.noise_floor_m, rel=0.1)
+
+
+def test_a_stop_is_said(episodes: list[Episode]) -> None:
+    def stop(progress: Progress) -> bool:
+        return False
+
+    assert calibrate(episodes, cell(), CONFIG, stop)[0].cancelled
