@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
+from compass_ros.cells import Cell
 from compass_ros.commands.progress import Bar
 
 
@@ -53,10 +54,17 @@ def demo(
         with Bar() as bar:
             calibrate(plan, nodes, bar)
     content = read_result(plan.result / "result.json")
-    print_result(from_json(content), played.truth)
+    print_result(from_json(content), worth_showing(content, played.truth, plan.cell))
     typer.echo(difference_line(content["gap"]))
     typer.echo(f"Recorded in {recorded - started:.0f} s, calibrated in {time.monotonic() - recorded:.0f} s.")
     typer.echo(f"report: {os.path.relpath(plan.result / 'report.html')}")
+
+
+def worth_showing(content: Mapping[str, Any], truth: Mapping[str, float], cell: Cell) -> dict[str, float]:
+    """The true values of what was found and of what the cell hides on purpose, not of all that is near its default."""
+    hidden = {parameter.name for parameter in cell.spec.parameters if parameter.target is not None}
+    shown = hidden | {row["name"] for row in content["parameters"] if row["active"]}
+    return {name: value for name, value in truth.items() if name in shown}
 
 
 def difference_line(gap: Mapping[str, Any]) -> str:

@@ -40,6 +40,11 @@ class Plan:
         return self.out / "calibration"
 
     @property
+    def truth(self) -> Path:
+        """What the virtual cell reveals; nothing reads it but people."""
+        return self.out / "truth.yaml"
+
+    @property
     def logs(self) -> Path:
         return self.out / "logs"
 
@@ -90,6 +95,7 @@ def play(plan: Plan, nodes: NodeGroup, report: Report) -> Played:
             messages.append(line["messages"])
             report(Progress("play shots", line["shot"], line["shot"] / line["of"], math.nan, math.nan))
     nodes.stop(cell, tracker, recorder, shooter)
+    plan.truth.write_text(yaml.safe_dump(dict(truth), sort_keys=False), encoding="utf-8")
     return Played(truth, tuple(messages))
 
 

@@ -4,28 +4,37 @@ from __future__ import annotations
 
 import signal
 import sys
+import threading
 from collections.abc import Callable
 
 import rclpy
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from compass_ros.errors import CompassError
 
+NOTICE_S = 0.2
+"""[s] How soon an idle node notices that it is told to end."""
+
 
 def run(make: Callable[[], Node], name: str) -> None:
     """Spin a node until it is told to end. A node that cannot start says why in one line, with exit status 1.
 
-    Signals end the loop between two callbacks or inside of one, before the context is closed: a callback never finds
-    its publishers gone.
+    Signals end the loop between two callbacks, before the context is closed: no callback finds its publishers gone.
+    An exception that a signal raises inside of rclpy could surface as anything; so a signal only leaves a note.
     """
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    told = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: told.set())
+    executor = SingleThreadedExecutor()
     try:
-        rclpy.spin(make())
+        executor.add_node(make())
+        while not told.is_set():
+            executor.spin_once(timeout_sec=NOTICE_S)
     except CompassError as error:
         sys.exit(f"{name}: {error}")
-    except KeyboardInterrupt:
-        return
     finally:
+        executor.shutdown()
         rclpy.try_shutdown()
