@@ -22,6 +22,7 @@ from compass_ros.cells import load
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
+from compass_ros.types import Floats
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ def compare(rollouts: int, threads: int, rounds: int, duration: float = 2.5) -> 
     shots = np.random.default_rng(0).uniform(low, high, (rollouts, len(low)))
     values = np.tile(cell.defaults, (rollouts, 1))
     with_field = np.hstack([values, np.tile([0.3, 0.2, 0.0, 0.12], (rollouts, 1))])
-    runs = (
+    runs: tuple[Callable[[], object], ...] = (
         bare_run(plain, rollouts, values, shots, duration),
         lambda: plain.motion(values, shots, duration),
         lambda: field.motion(with_field, shots, duration),
@@ -60,9 +61,7 @@ def compare(rollouts: int, threads: int, rounds: int, duration: float = 2.5) -> 
     return Cost(*best.ravel().tolist())
 
 
-def bare_run(
-    like: Simulator, rollouts: int, values: np.ndarray, shots: np.ndarray, duration: float
-) -> Callable[[], object]:
+def bare_run(like: Simulator, rollouts: int, values: Floats, shots: Floats, duration: float) -> Callable[[], object]:
     """The same starts and controls on the scene as it is, by `mujoco.rollout` alone."""
     dynamics = dynamics_of(like.cell)
     model = dynamics.model

@@ -176,7 +176,8 @@ class Simulator:
 
     def paths(self, values: Floats, inputs: Floats, time_s: Floats, names: Sequence[str]) -> Floats:
         """(B, F, N, 4) x, y [m], vx, vy [m/s] in the world of N bodies on the table; joints: angle, 0, rate, 0."""
-        columns, rest = [], []
+        columns: list[int] = []
+        rest: list[tuple[float, float, float, float]] = []
         for name in names:
             own, offset = path_columns(self._model, name)
             columns.extend(own)

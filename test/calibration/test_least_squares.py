@@ -29,8 +29,7 @@ def ridge(given: Likelihood) -> Floats:
 
 
 def total(given: Likelihood, point: Point, robust: float) -> float:
-    found = cost(given, [point], robust)
-    return float((found[0] if isinstance(found, tuple) else found)[0])
+    return float(cost(given, [point], robust)[0][0])
 
 
 def test_a_quadratic_is_solved_exactly() -> None:

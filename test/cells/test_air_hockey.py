@@ -91,7 +91,7 @@ def test_a_parameter_moves_its_fields_and_no_others(name: str) -> None:
     if name.endswith(NO_FIELD):
         assert moved == set()
         return
-    rules = FIELDS | {f"@dyna@{contact}": fields for contact, fields in CONTACT.items()}
+    rules = {**FIELDS, **{f"@dyna@{contact}": fields for contact, fields in CONTACT.items()}}
     (expected,) = [fields for end, fields in rules.items() if name.endswith(end)]
     assert moved == expected
 

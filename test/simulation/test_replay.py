@@ -9,15 +9,17 @@ import pytest
 
 from compass_ros.errors import DataError
 from compass_ros.simulation.replay import Replay, recordings
-from compass_ros.types import Episode, Floats, Track
+from compass_ros.types import Episode, Floats, Ints, Track
 from test.simulation.table import DESCRIBED, cell, simulator, values
 
 START = 1_700_000_000_000_000_000
 RATE = 60.0
 
 
-def stamps(first_s: float = -0.1, last_s: float = 2.6, offset_ns: int = 0) -> Floats:
-    return START + offset_ns + np.round(np.arange(first_s, last_s, 1 / RATE) * 1e9).astype(np.int64)
+def stamps(first_s: float = -0.1, last_s: float = 2.6, offset_ns: int = 0) -> Ints:
+    """Of a camera at RATE."""
+    since = np.round(np.arange(first_s, last_s, 1 / RATE) * 1e9).astype(np.int64)
+    return np.asarray(since + START + offset_ns)
 
 
 def recorded(name: str = "one", action: Floats = DESCRIBED, shift: Floats | None = None) -> Episode:

@@ -19,7 +19,7 @@ def drawn(count: int, seed: int) -> Floats:
     half = np.array([p.half_width for p in cell().parameters])
     low, high = np.array([(p.low, p.high) for p in cell().parameters]).T
     moves = np.random.default_rng(seed).uniform(-0.25, 0.25, (count, 64)) * half
-    return np.clip(cell().defaults + moves, low, high)
+    return np.asarray(np.clip(cell().defaults + moves, low, high))
 
 
 def test_one_two_and_four_threads_give_the_same_bits() -> None:

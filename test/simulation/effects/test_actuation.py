@@ -19,7 +19,7 @@ def followed(name: str, controls: Floats, *numbers: float) -> Floats:
     """(T, 2) what the arm makes of (T, 2) commands."""
     hook = effect(name).controls
     assert hook is not None
-    return hook(controls[None], np.array([numbers]), Context((), {}, (), (), STEP))[0]
+    return np.asarray(hook(controls[None], np.array([numbers]), Context((), {}, (), (), STEP))[0])
 
 
 def ramp() -> Floats:
@@ -67,7 +67,8 @@ def test_a_jitter_scales_the_speed() -> None:
 def simulated(name: str, number: float, duration: float = 1.5) -> Floats:
     """(T + 1, 4) what the described shot does with the effect."""
     changed = Simulator(cell(), [Attached(effect(name), ())], threads=1)
-    return changed.motion(np.append(cell().defaults, number)[None], DESCRIBED[None], duration).positions[0]
+    motion = changed.motion(np.append(cell().defaults, number)[None], DESCRIBED[None], duration)
+    return np.asarray(motion.positions[0])
 
 
 def test_a_delay_shifts_everything_that_follows() -> None:

@@ -39,7 +39,7 @@ def stepped(model: mujoco.MjModel) -> Floats:
 
 def pucks(rows: Floats) -> Floats:
     """(..., 4) positions of the pucks on the table."""
-    return rows[:, [2, 3, 5, 6]] + np.array([-0.15, 0, -0.075, -0.075])
+    return np.asarray(rows[:, [2, 3, 5, 6]] + np.array([-0.15, 0, -0.075, -0.075]))
 
 
 ACTING = ["fan_field", "friction_patch", "magnus", "rate_dependent_restitution", "local_wall", "off_centre_mass"]

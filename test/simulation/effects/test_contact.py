@@ -42,7 +42,7 @@ def bounced(given: Exported, velocity: tuple[float, float, float]) -> Floats:
     with attach(model, data, given):
         while data.qvel[1] < 0 or data.ncon:
             mujoco.mj_step(model, data)
-    return data.qvel.copy()
+    return np.array(data.qvel)
 
 
 def by_hand(speed: float, slope: float) -> float:

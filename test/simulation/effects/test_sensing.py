@@ -18,7 +18,7 @@ START = np.array([-0.2, 0.1, 0.05, -0.1])
 
 def line(time: Floats) -> Floats:
     """Two pucks that move straight on."""
-    return START + VELOCITY * time[:, :, None]
+    return np.asarray(START + VELOCITY * time[:, :, None])
 
 
 def seen(name: str, number: float, sample: Sample = line) -> Floats:
@@ -26,7 +26,7 @@ def seen(name: str, number: float, sample: Sample = line) -> Floats:
     hook = effect(name).sensing
     assert hook is not None
     context = Context((), {}, ((0, 1), (2, 3)), (0, 1, 2, 3), 0.001)
-    return hook(sample, np.array([[number]]), context)(TIME)[0]
+    return np.asarray(hook(sample, np.array([[number]]), context)(TIME)[0])
 
 
 def test_a_latency_shows_the_past() -> None:
