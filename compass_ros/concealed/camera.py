@@ -88,12 +88,13 @@ def _glass(rng: Generator, places: Places, other: float) -> dict[str, float]:
 def _lens(size: float, shape: Shape, sample: Sample) -> Sample:
     """Brown's radial distortion with two terms; k2 in shares of k1, 1/m^2."""
 
-    def bent(time: Floats) -> Floats:
+    def through(time: Floats) -> Floats:
         seen = _planar(sample(time))
         r2 = np.sum(seen**2, axis=3, keepdims=True)
-        return (seen * (1 + 0.05 * size * shape["hand"] * (r2 + shape["k2"] * r2**2))).reshape(*seen.shape[:2], 4)
+        bent = 1 + 0.05 * size * shape["hand"] * (r2 + shape["k2"] * r2**2)
+        return np.asarray((seen * bent).reshape(*seen.shape[:2], 4))
 
-    return bent
+    return through
 
 
 LENS = Law("lens_distortion", "sensing", _PHASES, draw=_glass, camera=_lens, most=8.0)

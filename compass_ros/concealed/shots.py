@@ -53,7 +53,7 @@ def choose_shots(cell: Cell, values: Floats, count: int, rng: Generator) -> Floa
     if keep.sum() < count:
         raise DataError(f"{cell.name}: only {keep.sum()} of {len(pool)} shots are fit to be used, {count} are needed")
     features = _features(pool, planned, simulator.time_step * _STRIDE)
-    return pool[keep][_diverse(features[keep], count, rng)]
+    return np.asarray(pool[keep][_diverse(features[keep], count, rng)])
 
 
 def _distance(one: Floats, other: Floats) -> Floats:

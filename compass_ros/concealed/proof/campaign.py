@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,12 +63,6 @@ def prove(plan: Plan, path: Path, jobs: int, tell: Tell, run_world: RunWorld) ->
                 tell(key, known[key], done, len(todo))
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
-
-
-def chosen(found: Sequence[Line], plan: Plan) -> list[Line]:
-    """The lines of a plan."""
-    wanted = set(plan.worlds_to_prove())
-    return [line for line in found if lines.key(line) in wanted]
 
 
 def commit() -> str:
