@@ -17,7 +17,7 @@ from test.simulation.table import actions, cell, simulator, values
 START = 1_700_000_000_000_000_000
 NOISE = 5e-4
 TRUTH = {"pusher@actuation@vel_discount": 0.85, "puck2@dyna@friction_sliding": 0.03, "env@camera@bias_x": 0.03}
-CONFIG = CalibrationConfig(method="random", rollouts=32, discover=False, seed=3)
+CONFIG = CalibrationConfig(method="random", rollouts=32, discover=False, seed=3, held_out_share=0.25)
 FIELDS = ("x", "y", "angle", "velocity")
 
 
