@@ -15,7 +15,7 @@ import pytest
 
 from test.test_layering import HOMES, MODULES, ROOT, imports
 
-NODES = ("calibrator", "puck_tracker", "recorder", "virtual_cell")
+NODES = ("calibration_client", "calibrator", "puck_tracker", "recorder", "shooter", "virtual_cell")
 FROM_ROS = {library for libraries, parts in HOMES.items() for library in libraries if "nodes" in parts}
 PREFIX = Path(sys.prefix)
 

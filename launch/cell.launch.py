@@ -1,0 +1,71 @@
+"""The suite on a real cell with a RealSense camera over the table.
+
+    ros2 launch realsense2_camera rs_launch.py rgb_camera.color_profile:=640x480x60
+    ros2 launch compass_ros cell.launch.py
+
+The camera's topics are named as realsense2_camera names them; the arguments `image` and `camera_info` take others. The
+robot's driver publishes a compass_interfaces/ShotCommand, stamped with the moment the motion begins, on a topic that
+config/recorder.yaml lists. Each node has one YAML of parameters, which an argument can replace. Ctrl-C ends all.
+"""
+
+from launch.actions import DeclareLaunchArgument, SetEnvironmentVariable
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.substitutions import FindPackageShare
+
+from launch import LaunchDescription
+
+NODES = ("puck_tracker", "recorder", "calibrator")
+CAMERA = {"image": "/camera/camera/color/image_raw", "camera_info": "/camera/camera/color/camera_info"}
+TABLE = {"x": "0", "y": "0", "z": "0", "yaw": "0", "pitch": "0", "roll": "0"}
+
+
+def generate_launch_description() -> LaunchDescription:
+    config = PathJoinSubstitution([FindPackageShare("compass_ros"), "config"])
+    arguments = [
+        DeclareLaunchArgument("namespace", default_value="", description="namespace of all nodes"),
+        DeclareLaunchArgument("use_sim_time", default_value="false", description="take the time from /clock"),
+        DeclareLaunchArgument("world", default_value="world", description="frame in which the table stands"),
+    ]
+    arguments += [
+        DeclareLaunchArgument(
+            f"{name}_parameters",
+            default_value=PathJoinSubstitution([config, f"{name}.yaml"]),
+            description=f"YAML with the parameters of {name}",
+        )
+        for name in NODES
+    ]
+    arguments += [
+        DeclareLaunchArgument(name, default_value=topic, description=f"topic of the camera's {name}")
+        for name, topic in CAMERA.items()
+    ]
+    arguments += [
+        DeclareLaunchArgument(f"table_{name}", default_value=value, description=f"{name} of the table in `world`")
+        for name, value in TABLE.items()
+    ]
+    nodes = [
+        Node(
+            package="compass_ros",
+            executable=name,
+            name=name,
+            namespace=LaunchConfiguration("namespace"),
+            parameters=[
+                LaunchConfiguration(f"{name}_parameters"),
+                {"use_sim_time": LaunchConfiguration("use_sim_time")},
+            ],
+            remappings=[(topic, LaunchConfiguration(topic)) for topic in CAMERA] if name == "puck_tracker" else [],
+            output="screen",
+        )
+        for name in NODES
+    ]
+    place = [word for name in TABLE for word in (f"--{name}", LaunchConfiguration(f"table_{name}"))]
+    table = Node(
+        package="tf2_ros",
+        executable="static_transform_publisher",
+        name="table_in_world",
+        namespace=LaunchConfiguration("namespace"),
+        arguments=[*place, "--frame-id", LaunchConfiguration("world"), "--child-frame-id", "table"],
+    )
+    # Camera images are larger than the default shared-memory segment of Fast DDS.
+    profile = SetEnvironmentVariable("FASTRTPS_DEFAULT_PROFILES_FILE", PathJoinSubstitution([config, "fastdds.xml"]))
+    return LaunchDescription([*arguments, profile, *nodes, table])
