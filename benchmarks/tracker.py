@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from compass_ros.tracking.rehearsal import Shot, film, random_shot
 from compass_ros.tracking.scene_config import SceneConfig
 from compass_ros.tracking.tracker import Frame, TrackerState, step, use_one_core
 from compass_ros.tracking.virtual_camera import make_camera
+from compass_ros.types import Floats
 
 _DURATION_S = 2.5
 
@@ -104,7 +105,7 @@ def main() -> None:
     )
 
 
-def _swapped(frame: Frame, truth: dict[str, np.ndarray]) -> int:
+def _swapped(frame: Frame, truth: Mapping[str, Floats]) -> int:
     """Seen objects that are nearer to another object's truth than to their own."""
     count = 0
     for sighting in frame.sightings:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -66,11 +67,13 @@ class CalibrationConfig:
     """What `compass calibrate` does; everything but the recordings and the cell."""
 
     method: str = "default"
-    seed: int = Field(0, ge=0)
-    rollouts: int = Field(0, ge=0, description="most simulated rollouts of the method; 0 = what it takes by default")
-    discover: bool = Field(True, description="look for missing physics after the calibration")
-    held_out_share: float = Field(0.25, ge=0, lt=1, description="share of the episodes that is never fitted")
-    threads: int = Field(0, ge=0, description="threads for rollouts; 0 = all cores. Results do not depend on it")
+    seed: int = Field(default=0, ge=0)
+    rollouts: int = Field(
+        default=0, ge=0, description="most simulated rollouts of the method; 0 = what it takes by default"
+    )
+    discover: bool = Field(default=True, description="look for missing physics after the calibration")
+    held_out_share: float = Field(default=0.25, ge=0, lt=1, description="share of the episodes that is never fitted")
+    threads: int = Field(default=0, ge=0, description="threads for rollouts; 0: all cores. Results do not depend on it")
     compass: CompassConfig = Field(default_factory=CompassConfig)
 
 
@@ -96,4 +99,4 @@ def calibration_config(content: Mapping[str, object], where: str = "configuratio
         name = ".".join(str(part) for part in first["loc"])
         known = [f.name for f in (*fields(CalibrationConfig), *fields(CompassConfig))]
         hint = nearest(name.rsplit(".", 1)[-1], known) if first["type"] == "unexpected_keyword_argument" else ""
-        raise ConfigError(f"{where}: {name}: {first['msg']}, found {first['input']!r}{hint}") from error
+        raise ConfigError(f"{where}: {name}: {first['msg']}, found {reprlib.repr(first['input'])}{hint}") from error

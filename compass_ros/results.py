@@ -21,7 +21,7 @@ SCENE, EFFECTS = "scene.xml", "effects.yaml"
 def write_all(
     result: Result, found: Discovery, cell: Cell, out: Path, command: str = "", truth: Mapping[str, float] | None = None
 ) -> None:
-    """Write into `out`, each file whole or not at all; result.json last, so that its presence says that all is there."""
+    """Write into `out`, each file whole or not at all; result.json last: where it is, all is there."""
     make_writable(out)
     values = np.array([row.value for row in result.parameters])
     write_scene(cell, values, out / SCENE)

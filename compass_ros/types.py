@@ -18,7 +18,8 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 Quantity = Literal["xy", "xyz", "pose", "joint"]
-"""What one row of a track holds: planar position [m], position [m], position [m] + quaternion, joint position [rad or m]."""
+"""What one row of a track holds: planar position [m], position [m], position [m] + quaternion, joint position [rad or
+m]."""
 
 QUANTITY_SIZE: Mapping[Quantity, int] = {"xy": 2, "xyz": 3, "pose": 7, "joint": 1}
 
@@ -79,7 +80,8 @@ class Episode:
     """When the command was given, in the clock of the stamps. Simulated time 0."""
     tracks: tuple[Track, ...]
     initial_state: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    """Measured first state by object, where the cell does not fix it: position (and velocity) as the cell defines them."""
+    """Measured first state by object, where the cell does not fix it: position (and velocity) as the cell defines
+    them."""
     source: str = ""
     """Path of the bag."""
 

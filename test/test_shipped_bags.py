@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from compass_ros.cells import load
@@ -36,7 +35,7 @@ def test_the_bags_give_the_parameters_of_the_cell_that_played_them() -> None:
     target = {parameter.name: parameter.target for parameter in cell.spec.parameters}
     for name, within in WITHIN.items():
         assert found[name].active, name
-        np.testing.assert_allclose(found[name].value, target[name], atol=within, err_msg=name)
+        assert found[name].value == pytest.approx(target[name], abs=within), name
 
 
 def test_the_order_in_which_bags_are_named_does_not_matter() -> None:

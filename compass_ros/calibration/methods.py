@@ -83,8 +83,12 @@ DEFAULT = "causal-map"
 METHODS: dict[str, Method] = {
     method.name: method
     for method in (
-        Method("causal-map", "Ours: causes by intervention, then maximum a posteriori on a growing horizon", _causal_map),
-        Method("compass", "COMPASS as in the paper: causal graph, then gradient through the learned model", run_compass),
+        Method(
+            "causal-map", "Ours: causes by intervention, then maximum a posteriori on a growing horizon", _causal_map
+        ),
+        Method(
+            "compass", "COMPASS as in the paper: causal graph, then gradient through the learned model", run_compass
+        ),
         Method("npdr", "Neural posterior domain randomisation: sequential neural posterior on sbi", _npdr),
         Method("exi-net", "EXI-Net: learned forward model, parameters by back-propagation", _exi_net),
         Method("tune-net", "Tune-Net: regression of the parameter step from pairs of trajectories", _tune_net),
