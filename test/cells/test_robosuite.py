@@ -1,8 +1,8 @@
 """The robosuite environments against the cells' own simulator: same parameters, same shot, through an arm.
 
-Why they do not agree to the last bit: the hand follows the tool's path with a finite stiffness (4e4 1/s^2, what steps
-of 1 ms allow) and torques of at most 32 N m, and an arm pushes with 7-9 kg where the cell's pusher has 0.5 kg. Time step
-and solver are the cell's. No arm touches the falling ball, so there nothing but rounding may differ. A shot that ends at
+Why they do not agree to the last bit: the hand follows the tool's path with a finite stiffness (4e4 1/s^2, what 1 ms
+steps allow) and torques of at most 32 N m, and an arm pushes with 7-9 kg where the cell's pusher has 0.5 kg. Time step
+and solver are the cell's. No arm touches the falling ball: there nothing but rounding may differ. A shot that ends at
 the bar's corner goes left or right for a tenth of a millimetre: what 1 % of the action's range changes is added there.
 """
 
