@@ -53,7 +53,7 @@ def main(folder: Path, out: Path) -> None:
     image = render(camera, film.poses(film.begin + round(SHOWN_S * config.camera.rate_hz)), 0)
     paths = {track.object: _after(track, episode.start_ns) for track in episode.tracks}
 
-    figure = Figure(figsize=(12.4, 4.0), layout="constrained")
+    figure = Figure(figsize=(12.4, 4.4), layout="compressed")
     left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.42])
     left.imshow(cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
     for name, path in paths.items():
@@ -89,7 +89,7 @@ def main(folder: Path, out: Path) -> None:
     right.set_ylabel("y [m]")
     right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9, frameon=False)
     out.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(out, dpi=110, pil_kwargs={"quality": 88})
+    figure.savefig(out, dpi=110, bbox_inches="tight", pad_inches=0.08, pil_kwargs={"quality": 88})
 
 
 def _after(track: Track, start_ns: int) -> Floats:
