@@ -15,7 +15,17 @@ PACKAGE = ROOT / "compass_ros"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 STEPS = ("cells", "tracking", "episodes", "simulation", "calibration", "discovery", "policy", "reporting")
-JOINS = {"pipeline": 3, "results": 3, "concealed": 3, "bench": 4, "demo": 4, "commands": 5, "cli": 6, "nodes": 6}
+JOINS = {
+    "pipeline": 3,
+    "results": 3,
+    "operation": 3,
+    "concealed": 3,
+    "bench": 4,
+    "demo": 4,
+    "commands": 5,
+    "cli": 6,
+    "nodes": 6,
+}
 LAYERS = {"types": 0, "errors": 0, "config": 1, **dict.fromkeys(STEPS, 2), **JOINS}
 """A module imports from lower layers, or from its own part."""
 
@@ -26,7 +36,7 @@ HOMES = {
     ("rosbags", "mcap", "mcap_ros2"): {"episodes"},
     ("rclpy", "launch", "launch_ros", "ament_index_python", "rcl_interfaces", "action_msgs"): {"nodes"},
     ("builtin_interfaces", "std_msgs", "std_srvs", "sensor_msgs", "geometry_msgs"): {"nodes"},
-    ("visualization_msgs", "diagnostic_msgs", "compass_interfaces"): {"nodes"},
+    ("visualization_msgs", "nav_msgs", "lifecycle_msgs", "diagnostic_msgs", "compass_interfaces"): {"nodes"},
     ("domain_coordinator",): {"nodes", "demo"},
 }
 """Which parts of the package may import these libraries."""

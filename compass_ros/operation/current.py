@@ -1,0 +1,95 @@
+"""The simulator as it is in force: the cell as configured, or with a version's parameters and effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from compass_ros.cells import Cell
+from compass_ros.episodes import Source, find_bags, read_episode
+from compass_ros.reporting.result_json import read_result
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects.exported import read_effects
+from compass_ros.simulation.replay import Recordings, Replay, recordings
+from compass_ros.types import Episode, Floats
+
+
+@dataclass(frozen=True)
+class Current:
+    """A simulator and the values that it runs with."""
+
+    simulator: Simulator
+    values: Floats
+    """(P,) the cell's parameters, then the quantities of its effects."""
+
+    @property
+    def cell(self) -> Cell:
+        return self.simulator.cell
+
+    def gap(self, episode: Episode) -> float:
+        """Root mean square distance between an episode and its replay [m]. Raises DataError, ConfigError."""
+        return self._replay([episode]).gap(self.values).rmse_m
+
+    def residuals(self, episodes: Sequence[Episode]) -> Residuals:
+        """Where and how far the recordings of planar objects are from their replay. Raises DataError, ConfigError."""
+        replay = self._replay(episodes)
+        every = np.arange(len(episodes))
+        predicted = replay.predict(np.tile(self.values, (len(episodes), 1)), every)
+        return Residuals(self.cell, replay.data, predicted)
+
+    def _replay(self, episodes: Sequence[Episode]) -> Replay:
+        return Replay(self.simulator, recordings(self.cell, episodes))
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """E episodes, F frames, C columns: what was measured and what the simulator says."""
+
+    cell: Cell
+    data: Recordings
+    predicted: Floats
+    """(E, F, C)."""
+
+    def paths(self, name: str) -> tuple[Floats, Floats]:
+        """(E, F, 2) measured and predicted x, y of an object after the command [m]; NaN where it was not seen."""
+        columns = [i for i, c in enumerate(self.cell.channels) if c == name][:2]
+        after = (self.data.time_s >= 0)[:, :, None]
+        measured = np.where(after, self.data.measured[:, :, columns], np.nan)
+        return measured, np.where(np.isnan(measured), np.nan, self.predicted[:, :, columns])
+
+    def planar(self) -> tuple[str, ...]:
+        """Objects that have a place in the plane."""
+        return tuple(o.name for o in self.cell.objects if o.quantity != "joint")
+
+
+def current(cell: Cell, version: Path | None = None, threads: int = 0) -> Current:
+    """The cell as configured, or with the result.json and effects.yaml of a folder. Raises ConfigError."""
+    if version is None or not (version / "result.json").exists():
+        simulator = Simulator(cell, threads=threads)
+        return Current(simulator, simulator.defaults)
+    rows = read_result(version / "result.json")["parameters"]
+    where = str(version / "result.json")
+    values = cell.values({row["name"]: row["value"] for row in rows}, where)
+    if not (version / "effects.yaml").is_file():
+        return Current(Simulator(cell, threads=threads), values)
+    fitted = read_effects(version / "effects.yaml").effects
+    simulator = Simulator(cell, [one.attached for one in fitted], threads)
+    return Current(simulator, np.concatenate([values, *(np.array(one.values) for one in fitted)]))
+
+
+def sources(cell: Cell) -> list[Source]:
+    """Where the tracks of a cell's objects are in its bags."""
+    return [Source(o.topic or f"/puck_tracker/{o.name}/pose", o.name, o.quantity) for o in cell.objects]
+
+
+def read(cell: Cell, bag: Path | str) -> Episode:
+    """One episode of the cell. Raises BagError."""
+    return read_episode(bag, sources(cell), cell.name, cell.hash)
+
+
+def held_out_bags(bags: Sequence[str], names: Sequence[str]) -> tuple[Path, ...]:
+    """Those bags among the paths that are named as these episodes are. Raises BagError where there is no bag at all."""
+    return tuple(bag for bag in find_bags(bags) if bag.name in names)
