@@ -1,4 +1,4 @@
-"""Everything that a calibration leaves on disk: result.json, report.html, the calibrated scene and the effects."""
+"""Everything that a calibration leaves on disk: result, report, trajectories, the calibrated scene and the effects."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from compass_ros.cells import Cell
 from compass_ros.discovery import Discovery
 from compass_ros.errors import ConfigError
 from compass_ros.reporting import ReportExtras, Scene, Shape, write_report, write_result
+from compass_ros.reporting.kept import RESULT, TRAJECTORIES, write_trajectories
 from compass_ros.simulation.export import write_effects_of, write_scene
 from compass_ros.types import Result
 
-SCENE, EFFECTS = "scene.xml", "effects.yaml"
+SCENE, EFFECTS, REPORT = "scene.xml", "effects.yaml", "report.html"
 
 
 def write_all(
@@ -26,8 +27,10 @@ def write_all(
     values = np.array([row.value for row in result.parameters])
     write_scene(cell, values, out / SCENE)
     write_effects_of(found.simulator, found.values, found.effect_std, cell, values, out / EFFECTS)
-    write_report(result, out / "report.html", ReportExtras(command, scene_of(cell), truth=dict(truth or {})))
-    write_result(result, out / "result.json")
+    extras = ReportExtras(command, scene_of(cell), truth=dict(truth or {}))
+    write_report(result, out / REPORT, extras)
+    write_trajectories(result, out / TRAJECTORIES, extras)
+    write_result(result, out / RESULT)
 
 
 def make_writable(out: Path) -> None:

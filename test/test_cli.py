@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -16,13 +15,13 @@ import pytest
 import yaml
 
 from compass_ros.cells import load
-from compass_ros.cli import main
 from compass_ros.episodes import read_episode, write_episode
 from compass_ros.episodes.bag import RawMessage, scan
 from compass_ros.episodes.definitions import STRING_TYPE, embedded_definition
 from compass_ros.episodes.writer import BagWriter
 from compass_ros.types import Episode
 from test.commands.image_bags import image_bag
+from test.conftest import Run
 from test.episodes.planted import PUCKS
 from test.nodes.recordings import record
 
@@ -34,25 +33,6 @@ CAMERA = {
     "camera_matrix": {"data": K},
     "distortion_coefficients": {"data": [0.0] * 5},
 }
-
-Run = Callable[..., tuple[int, str, str]]
-"""Words of a command line -> status, standard output, standard error."""
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
-    def call(*words: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["compass", *map(str, words)])
-        try:
-            main()
-            status: Any = 0
-        except SystemExit as end:
-            status = end.code or 0
-        out, err = capfd.readouterr()
-        return int(status), out, err
-
-    return call
-
 
 @pytest.fixture(scope="module")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -1,4 +1,4 @@
-"""Writing a text file so that a reader sees the old one or the new one, never a half."""
+"""Writing a file so that a reader sees the old one or the new one, never a half."""
 
 from __future__ import annotations
 
@@ -10,7 +10,12 @@ from compass_ros.errors import ConfigError
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write UTF-8 `text` to a temporary file beside `path`, then rename. Raises ConfigError when that is impossible."""
+    """Write UTF-8 `text` as `write_bytes` does."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write to a temporary file beside `path`, then rename. Raises ConfigError when that is impossible."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
@@ -18,8 +23,8 @@ def write_text(path: Path, text: str) -> None:
         raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
     temporary = Path(name)
     try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
             file.flush()
             os.fsync(file.fileno())
         temporary.chmod(0o644)

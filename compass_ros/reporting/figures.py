@@ -52,14 +52,15 @@ ROLE: Mapping[str, Mapping[str, Any]] = {
 }
 
 
-def _style() -> AbstractContextManager[None]:
+def styled() -> AbstractContextManager[None]:
+    """The style of all figures, while the context is open."""
     return rc_context(cast(Any, STYLE))
 
 
 def save(figure: Figure, path: Path) -> None:
     """Write PNG or SVG after the ending of the path; the same figure gives the same bytes."""
     metadata = {"Date": None} if path.suffix == ".svg" else {}
-    with _style():
+    with styled():
         figure.savefig(path, metadata=metadata)
 
 
@@ -70,7 +71,7 @@ def _path(track: ReplayedTrack, model: Model) -> Floats | None:
 def trajectories(replay: Replay, scene: Scene | None = None) -> Figure:
     """One episode seen from above: recorded points, and each model's path. Needs planar tracks."""
     first, second = plane([replay])
-    with _style():
+    with styled():
         figure = Figure(figsize=(6.4, 3.6), layout="constrained")
         axes = figure.add_subplot()
         axes.grid(visible=False)
@@ -113,7 +114,7 @@ def causal_graph(graph: Graph, rows: int = 24) -> Figure:
     """psi of the `rows` parameters with the strongest edges, strongest on top."""
     order = np.argsort(-graph.psi.max(axis=1), kind="stable")[:rows]
     colours = LinearSegmentedColormap.from_list("psi", [LIGHT["sunken"], LIGHT["heat"]])
-    with _style():
+    with styled():
         figure = Figure(figsize=(3.2 + 0.7 * len(graph.factors), 0.8 + 0.22 * order.size), layout="constrained")
         axes = figure.add_subplot()
         axes.grid(visible=False)
@@ -130,7 +131,7 @@ def parameter_curves(result: Result, most: int = 12, truth: Mapping[str, float] 
     known, traced = truth or {}, [it for it in result.trace if it.values.size == len(result.parameters)]
     active = [(i, row) for i, row in enumerate(result.parameters) if row.active][:most]
     columns, rollouts = min(3, max(len(active), 1)), [it.rollouts for it in traced]
-    with _style():
+    with styled():
         figure = Figure(figsize=(2.5 * columns, 1.6 * max(math.ceil(len(active) / columns), 1)), layout="constrained")
         for place, (i, row) in enumerate(active):
             axes = figure.add_subplot(math.ceil(len(active) / columns), columns, place + 1)
@@ -150,7 +151,7 @@ def gap_bars(result: Result) -> Figure:
     models = [m for m in MODELS if math.isfinite(held_out_rmse(result, m))]
     errors = [held_out_rmse(result, m) * 1e3 for m in models]
     floor = result.noise_floor_m * 1e3
-    with _style():
+    with styled():
         figure = Figure(figsize=(6.0, 0.75 + 0.36 * len(models)), layout="constrained")
         axes = figure.add_subplot()
         axes.grid(visible=False, axis="y")

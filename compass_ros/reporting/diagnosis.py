@@ -1,0 +1,128 @@
+"""A result explained in a terminal: the three answers, each check, and where and when something is left."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from compass_ros.reporting.checks import SUMMARY, assess, overall
+from compass_ros.reporting.extras import ReportExtras, ResidualMap
+from compass_ros.reporting.numbers import MINUS, millimetres, percent, plain, probability, unit_text, value_pm
+from compass_ros.reporting.residuals import error_curves, left_over
+from compass_ros.reporting.table import STYLE, gap_table, parameter_table
+from compass_ros.reporting.view.missing import ranking
+from compass_ros.reporting.words import (
+    MODEL_LABEL,
+    VERDICT_LEVEL,
+    VERDICT_MEANING,
+    VERDICT_TITLE,
+    Level,
+    best_model,
+    where_rows,
+)
+from compass_ros.types import EffectFinding, Floats, Result
+
+BARS = "▁▂▃▄▅▆▇█"
+SHADES = "·░▒▓█"
+MARK: dict[Level, str] = {"good": "+", "note": "-", "care": "!", "bad": "x"}
+
+
+def print_diagnosis(result: Result, extras: ReportExtras, console: Console | None = None) -> None:
+    """Print everything that a result says about its question 3, and whether to believe it."""
+    out = console or Console()
+    verdict = result.mismatch.verdict
+    out.print(Text.assemble((f"{VERDICT_TITLE[verdict]}. ", STYLE[VERDICT_LEVEL[verdict]]), result.mismatch.sentence))
+    out.print(Text(VERDICT_MEANING[verdict], "dim"))
+    for heading, text in where_rows(result.mismatch.where) if result.mismatch.where else ():
+        out.print(Text(f"  {heading:8} {text}"))
+    out.print(gap_table(result))
+    out.print(parameter_table(result, extras.truth))
+    for finding in result.mismatch.effects:
+        out.print(_effect(finding))
+    if extras.candidates:
+        out.print(_candidates(result, extras))
+    for line in (*_curves(result), *_map(left_over(result, extras), result)):
+        out.print(line, no_wrap=True, overflow="crop")
+    checks = assess(result)
+    for check in checks:
+        out.print(Text.assemble((f"{MARK[check.level]} {check.title}. ", STYLE[check.level]), check.detail))
+    out.print(Text(f"Is the result good? {SUMMARY[overall(checks)]}", STYLE[overall(checks)]))
+    if result.mismatch.undetectable:
+        out.print(Text("These shots could not have shown: " + ", ".join(result.mismatch.undetectable), "dim"))
+    if result.mismatch.next_experiment:
+        out.print(Text.assemble(("Next experiment: ", "bold"), result.mismatch.next_experiment))
+
+
+def _effect(finding: EffectFinding) -> Table:
+    evidence = finding.evidence
+    said = [f"removes {percent(evidence.held_out_gain)} of the excess held-out error"]
+    said.append(f"log evidence {plain(evidence.log_evidence, 3)}")
+    said.append(f"false alarm {probability(evidence.false_alarm_p)}")
+    if finding.equivalents:
+        said.append("not told apart from " + ", ".join(finding.equivalents))
+    table = Table("parameter", "value", "unit", title=Text(finding.name, "bold"), title_justify="left")
+    table.caption, table.caption_justify = Text("; ".join(said), "dim"), "left"
+    for name, p in finding.parameters.items():
+        table.add_row(Text(name), Text(value_pm(p.value, p.std)), Text(unit_text(p.unit)))
+    return table
+
+
+def _candidates(result: Result, extras: ReportExtras) -> Table:
+    table = Table("candidate", "channel", "log evidence", "held-out gain", "", title="Tried", title_justify="left")
+    for row in ranking(result, extras.candidates):
+        style = "bold" if row["kept"] else "dim"
+        table.add_row(*(Text(str(row[key]), style) for key in ("name", "channel", "evidence", "gain", "note")))
+    return table
+
+
+def _curves(result: Result) -> Iterator[Text]:
+    """Error over time on a logarithmic scale from the noise floor to the largest error, one line a model."""
+    curves = error_curves(result)
+    largest = max((float(np.nanmax(c.rms_m)) for c in curves if np.isfinite(c.rms_m).any()), default=0.0)
+    if not largest > 0:
+        return
+    floor = result.noise_floor_m if math.isfinite(result.noise_floor_m) else 0.0
+    low = min(max(floor, largest * 1e-3), largest * 0.5)
+    end = max(float(c.time_s[-1]) for c in curves)
+    yield Text(
+        f"Error over the {end:.1f} s of a shot, {BARS[0]} {millimetres(low)} mm and less, "
+        f"{BARS[-1]} {millimetres(largest)} mm, logarithmic:"
+    )
+    width = max(len(c.object) for c in curves)
+    for curve in curves:
+        share = np.log(np.maximum(curve.rms_m, low) / low) / np.log(largest / low)
+        yield Text(f"  {curve.object:{width}} {MODEL_LABEL[curve.model]:12} {_line(share, BARS)}")
+
+
+def _line(share: Floats, signs: str) -> str:
+    """One sign for each number in [0, 1]; a blank for NaN."""
+    steps = len(signs) - 1
+    return "".join(" " if math.isnan(s) else signs[min(max(round(s * steps), 0), steps)] for s in share.tolist())
+
+
+def _map(residual: ResidualMap | None, result: Result) -> Iterator[Text]:
+    """Seen from above, two rows of cells in one line of text, so that the plane keeps its shape."""
+    if residual is None or not np.isfinite(residual.value).any():
+        return
+    largest = float(np.nanmax(residual.value))
+    rows = _pairs(residual.value)
+    yield Text(
+        f"What the {MODEL_LABEL[best_model(result)]} simulator leaves over, from above; {SHADES[0]} nothing, "
+        f"{SHADES[-1]} {plain(largest, 2)} {residual.unit} ({residual.label}):"
+    )
+    yield from (Text("  " + _line(row / largest if largest > 0 else row, SHADES).rstrip()) for row in rows[::-1])
+    ends = [f"{float(axis[0]):.2f} to {float(axis[-1]):.2f} m" for axis in (residual.x_m, residual.y_m)]
+    yield Text(f"  horizontal {ends[0]}, vertical {ends[1]}".replace("-", MINUS), "dim")
+
+
+def _pairs(value: Floats) -> Sequence[Floats]:
+    """(Y, X) -> ceil(Y / 2) rows, each the mean of two, NaN only where both are."""
+    padded = np.concatenate([value, np.full((len(value) % 2, value.shape[1]), np.nan)])
+    two = padded.reshape(-1, 2, value.shape[1])
+    seen = np.isfinite(two).sum(axis=1)
+    return list(np.where(seen > 0, np.nansum(two, axis=1) / np.maximum(seen, 1), np.nan))
