@@ -16,8 +16,9 @@ from compass_ros.concealed.laws import KNOWN, LAWS, OUTSIDE, known
 from compass_ros.concealed.library import in_library_terms
 from compass_ros.concealed.recording import NOISES, episodes, frame_times, seen
 from compass_ros.concealed.shots import choose_shots
-from compass_ros.concealed.strength import Judge, Strength, sized, twins
+from compass_ros.concealed.strength import Judge, Strength, sized
 from compass_ros.concealed.table import Played, Table
+from compass_ros.concealed.twins import twins
 from compass_ros.errors import ConfigError
 from compass_ros.types import Episode, Floats
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -82,7 +83,9 @@ def test_conceal_and_unseal_as_a_user_types_them(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert len(list(world.glob("shot_*/*.mcap"))) == 12
     shown = compass("unseal", world, "--answers", answers)
-    assert shown.stdout.startswith("true: swirl on puck1 and puck2, 3."), shown.stdout
+    strength = re.match(r"true: swirl on puck1 and puck2, ([\d.]+) mm rms", shown.stdout)
+    assert strength, shown.stdout
+    assert float(strength[1]) == pytest.approx(3.0, rel=0.16)
     taken = compass("conceal", *asked, "--out", world, "--answers", answers)
     assert (taken.returncode, len(taken.stderr.splitlines())) == (1, 1)
     assert "is not empty" in taken.stderr
