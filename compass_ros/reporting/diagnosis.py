@@ -22,7 +22,6 @@ from compass_ros.reporting.words import (
     VERDICT_MEANING,
     VERDICT_TITLE,
     Level,
-    best_model,
     where_rows,
 )
 from compass_ros.types import EffectFinding, Floats, Result
@@ -44,9 +43,10 @@ def print_diagnosis(result: Result, extras: ReportExtras, console: Console | Non
     out.print(parameter_table(result, extras.truth))
     for finding in result.mismatch.effects:
         out.print(_effect(finding))
+        out.print(Text(f"{finding.name} {_evidence(finding)}"))
     if extras.candidates:
         out.print(_candidates(result, extras))
-    for line in (*_curves(result), *_map(left_over(result, extras), result)):
+    for line in (*_curves(result), *_map(left_over(result, extras))):
         out.print(line, no_wrap=True, overflow="crop")
     checks = assess(result)
     for check in checks:
@@ -58,15 +58,18 @@ def print_diagnosis(result: Result, extras: ReportExtras, console: Console | Non
         out.print(Text.assemble(("Next experiment: ", "bold"), result.mismatch.next_experiment))
 
 
-def _effect(finding: EffectFinding) -> Table:
+def _evidence(finding: EffectFinding) -> str:
     evidence = finding.evidence
     said = [f"removes {percent(evidence.held_out_gain)} of the excess held-out error"]
     said.append(f"log evidence {plain(evidence.log_evidence, 3)}")
     said.append(f"false alarm {probability(evidence.false_alarm_p)}")
     if finding.equivalents:
         said.append("not told apart from " + ", ".join(finding.equivalents))
+    return "; ".join(said)
+
+
+def _effect(finding: EffectFinding) -> Table:
     table = Table("parameter", "value", "unit", title=Text(finding.name, "bold"), title_justify="left")
-    table.caption, table.caption_justify = Text("; ".join(said), "dim"), "left"
     for name, p in finding.parameters.items():
         table.add_row(Text(name), Text(value_pm(p.value, p.std)), Text(unit_text(p.unit)))
     return table
@@ -105,15 +108,15 @@ def _line(share: Floats, signs: str) -> str:
     return "".join(" " if math.isnan(s) else signs[min(max(round(s * steps), 0), steps)] for s in share.tolist())
 
 
-def _map(residual: ResidualMap | None, result: Result) -> Iterator[Text]:
+def _map(residual: ResidualMap | None) -> Iterator[Text]:
     """Seen from above, two rows of cells in one line of text, so that the plane keeps its shape."""
     if residual is None or not np.isfinite(residual.value).any():
         return
     largest = float(np.nanmax(residual.value))
     rows = _pairs(residual.value)
     yield Text(
-        f"What the {MODEL_LABEL[best_model(result)]} simulator leaves over, from above; {SHADES[0]} nothing, "
-        f"{SHADES[-1]} {plain(largest, 2)} {residual.unit} ({residual.label}):"
+        f"What calibration leaves over, seen from above, {SHADES[0]} nothing, {SHADES[-1]} {plain(largest, 2)} "
+        f"{residual.unit}:"
     )
     yield from (Text("  " + _line(row / largest if largest > 0 else row, SHADES).rstrip()) for row in rows[::-1])
     ends = [f"{float(axis[0]):.2f} to {float(axis[-1]):.2f} m" for axis in (residual.x_m, residual.y_m)]

@@ -83,5 +83,6 @@ def left_over_map(residual: ResidualMap, region: Region | None = None, axes_show
             axes.add_patch(Circle(region.centre_m, region.radius_m, fill=False, edgecolor=LIGHT["bad"], linewidth=1.5))
         axes.set_xlabel(f"{'xyz'[axes_shown[0]]} [m]")
         axes.set_ylabel(f"{'xyz'[axes_shown[1]]} [m]")
-        figure.colorbar(image, label=f"{residual.label} [{residual.unit}]", shrink=0.8)
+        axes.set_title(residual.label)
+        figure.colorbar(image, label=residual.unit, shrink=0.8)
     return figure

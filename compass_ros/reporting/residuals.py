@@ -9,7 +9,7 @@ import numpy as np
 
 from compass_ros.reporting.drawing import distance_map, error_m, plane
 from compass_ros.reporting.extras import ReportExtras, ResidualMap
-from compass_ros.reporting.words import MODELS, Model, best_model
+from compass_ros.reporting.words import MODELS, Model
 from compass_ros.types import Floats, Replay, Result
 
 
@@ -53,6 +53,5 @@ def judged(replays: Sequence[Replay]) -> tuple[Replay, ...]:
 
 
 def left_over(result: Result, extras: ReportExtras) -> ResidualMap | None:
-    """What the best model leaves over on the table; None where no planar motion was recorded."""
-    given = extras.residual_after or extras.residual_before
-    return given or distance_map(result.replays, best_model(result), plane(result.replays))
+    """What the calibrated simulator leaves over, without effects; None where no planar motion was recorded."""
+    return extras.residual_before or distance_map(result.replays, "calibrated", plane(result.replays))

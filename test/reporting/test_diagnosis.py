@@ -57,7 +57,7 @@ def test_a_map_is_drawn_the_right_way_up(result: Result) -> None:
     value[0, 0] = 0.0
     grid = ResidualMap("push", "m/s^2", np.arange(6) * 0.02, np.arange(4) * 0.02, value)
     rows = printed(result, ReportExtras(residual_before=grid)).splitlines()
-    start = next(i for i, row in enumerate(rows) if "(push)" in row)
+    start = next(i for i, row in enumerate(rows) if "seen from above" in row)
     assert rows[start + 1] == "  " + 5 * " " + SHADES[-1]
     assert rows[start + 2] == "  " + SHADES[0]
 
