@@ -3,7 +3,7 @@
 #   make demo    the main job: a virtual robot cell plays shots, and the calibrator finds what is wrong with the simulator
 #   make test    ruff, mypy, all tests
 #   make prove   120 sealed worlds: conceal, calibrate blindly, unseal, count; goes on where it was stopped
-#   make lint | bench | lock | clean
+#   make lint | bench | bags | lock | clean
 #
 # ARGS are handed on:  make demo ARGS="--shots 20"
 
@@ -19,7 +19,7 @@ export MUJOCO_GL ?= disable
 SHARED := $(shell find resource config launch -type f -o -type l)
 NATIVE := $(wildcard compass_ros/simulation/native/*.c)
 
-.PHONY: demo prove test lint bench install interfaces lock clean
+.PHONY: demo prove test lint bench bags install interfaces lock clean
 .DELETE_ON_ERROR:
 
 demo: install
@@ -35,6 +35,10 @@ lint: install
 
 bench: install
 	$(BIN)/compass bench $(ARGS)
+
+# After a change to the air-hockey cell: the shipped bags, recorded anew by the nodes.
+bags: install
+	$(BIN)/python scripts/record_bags.py
 
 prove: install
 	$(BIN)/compass prove --worlds 120 --jobs $(JOBS) --out proof/results.jsonl --page docs/proof.md $(ARGS)
