@@ -76,6 +76,7 @@ setup(
         "opencv-python",
         "openpyxl",
         "pydantic>=2",
+        "pysindy",
         "pyyaml",
         "rich",
         "rosbags",

@@ -1,0 +1,224 @@
+"""When no known effect explains what is left: a formula in position and velocity, proposed by sparse regression.
+
+The regression is in the space of the recordings, not of differentiated data: each term's acceleration along the
+calibrated paths is carried by the impulse responses into the residual, and the parameters take their part first. With
+S the information of the terms and g their pull, S = L L', the problem |L' w + L^-1 g|^2 is that of all frames; it is
+handed to sequentially thresholded least squares (SINDy: Brunton, Proctor and Kutz 2016; here pysindy).
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from compass_ros.calibration.least_squares import Point
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.refine import residual_at
+from compass_ros.discovery.candidates import Candidate
+from compass_ros.discovery.joint import Joint, fit_jointly
+from compass_ros.discovery.screen import Score, Space
+from compass_ros.simulation.effects import Attached, Effect, Quantity
+from compass_ros.simulation.effects.effect import Context
+from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.types import Floats
+
+NAME = "formula"
+THRESHOLDS = (3.0, 5.0, 8.0, 12.0, 20.0, 40.0)
+"""Sizes under which a coefficient is dropped [its own sigma], weighed against each other by the BIC."""
+MOST_TERMS = 6
+KEPT = 0.1
+"""Share of the excess held-out error that a formula has to remove to be kept."""
+_LARGEST = 3.0
+"""Acceleration that one term may reach anywhere on the table at 0.5 m/s [m/s^2]."""
+_SIZE = {"x": 0.45, "y": 0.225, "vx": 0.5, "vy": 0.5, "speed": 0.5}
+_VARIABLES = tuple(_SIZE)
+_ALONG_X, _ALONG_Y, _AGAINST = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Monomial:
+    """One term: a component of the acceleration, and powers of x, y, vx, vy and speed."""
+
+    component: int
+    """0 along x, 1 along y, 2 against the velocity."""
+    powers: tuple[int, int, int, int, int]
+
+    @property
+    def size(self) -> float:
+        """Its value at the edge of the table and 0.5 m/s."""
+        return float(np.prod([_SIZE[v] ** p for v, p in zip(_VARIABLES, self.powers, strict=True)]))
+
+    @property
+    def unit(self) -> str:
+        """Of its coefficient."""
+        metres, seconds = 1 - sum(self.powers), sum(self.powers[2:]) - 2
+        parts = [f"{base}^{power}" if power != 1 else base
+                 for base, power in (("m", metres), ("s", seconds)) if power]  # fmt: skip
+        return " ".join(parts) or "1"
+
+    @property
+    def text(self) -> str:
+        parts = [f"{v}^{p}" if p > 1 else v for v, p in zip(_VARIABLES, self.powers, strict=True) if p]
+        return " ".join(parts)
+
+    @property
+    def name(self) -> str:
+        """As a name of a quantity."""
+        head = ("ax", "ay", "slowing")[self.component]
+        return "_".join([head, *(f"{v}{p}" if p > 1 else v for v, p in zip(_VARIABLES, self.powers, strict=True) if p)])
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A proposal; never a name."""
+
+    terms: tuple[Monomial, ...]
+    coefficients: Floats
+    """(n,)"""
+    gain: float
+    """Fall of the cost to first order [log likelihood]."""
+    score: Score
+
+    @property
+    def text(self) -> str:
+        """As in 'ax = +0.21 x, slowing = +0.4 speed^2' (SI)."""
+        parts = []
+        for component, head in enumerate(("ax", "ay", "slowing")):
+            own = [
+                f"{c:+.3g} {t.text}".strip()
+                for t, c in zip(self.terms, self.coefficients, strict=True) if t.component == component
+            ]  # fmt: skip
+            if own:
+                parts.append(f"{head} = {' '.join(own)}")
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A formula inside the simulator, fitted together with the parameters."""
+
+    formula: Formula
+    joint: Joint
+    held_out_gain: float
+    """Share of the excess held-out error that it removes."""
+    sentence: str
+
+
+@cache
+def basis() -> tuple[Monomial, ...]:
+    """Fields up to the third degree in place, couplings to velocity, and slowing that depends on speed and place."""
+    out = []
+    for component in (_ALONG_X, _ALONG_Y):
+        out += [Monomial(component, (i, j, 0, 0, 0)) for i in range(4) for j in range(4 - i)]
+        out += [Monomial(component, (0, 0, *v, s)) for v in ((1, 0), (0, 1)) for s in (0, 1)]
+    places = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
+    out += [Monomial(_AGAINST, (*place, 0, 0, s)) for place in places for s in (0, 1)]
+    out += [Monomial(_AGAINST, (0, 0, 0, 0, s)) for s in (2, 3)]
+    return tuple(out)
+
+
+def effect_of(terms: Sequence[Monomial]) -> Effect:
+    """Terms as physics inside the simulator; one coefficient each."""
+
+    def forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
+        out = []
+        for name in context.objects:
+            for i, term in enumerate(terms):
+                rest = np.tile([*term.powers, term.component], (len(numbers), 1))
+                out.append(Term(Kind.LIBRARY, name, np.hstack([numbers[:, i : i + 1], rest])))
+        return tuple(out)
+
+    return Effect(
+        name=NAME,
+        channel="dynamics",
+        quantities=tuple(Quantity(t.name, t.unit, -_LARGEST / t.size, _LARGEST / t.size, 0.02 / t.size) for t in terms),
+        sentence="a force as proposed by regression",
+        forces=forces,
+    )
+
+
+def regress(space: Space, objects: tuple[str, ...]) -> Formula | None:
+    """The sparse formula on some movers that explains the residual best; None where no term is needed."""
+    terms = basis()
+    candidate = Candidate(Attached(effect_of(terms), objects))
+    units = np.diag([q.scale for q in candidate.attached.effect.quantities])
+    weights = space.weights(candidate, np.zeros(len(terms)), units)
+    information, pull = space.reduced(weights)
+    c = space.likelihood.correlation_time
+    size = np.sqrt(np.maximum(np.diag(information), 1e-12))
+    information, pull = information / np.outer(size, size), pull / size
+    chosen = _sparse(information / c, pull / c, float(np.log(space.likelihood.measurements / c)))
+    if not len(chosen):
+        return None
+    solved = -np.linalg.solve(information[np.ix_(chosen, chosen)], pull[chosen]) / size[chosen]
+    gain = -0.5 * float(pull[chosen] @ (solved * size[chosen]))
+    kept = tuple(terms[i] for i in chosen)
+    attached = Attached(effect_of(kept), objects)
+    low, high = (np.array([getattr(q, side) for q in attached.effect.quantities]) for side in ("low", "high"))
+    numbers = np.clip(solved, low, high)
+    tangent = space.tangent_of_weights(weights[:, :, chosen]) @ numbers
+    return Formula(kept, numbers, gain, Score(Candidate(attached), numbers, gain, tangent))
+
+
+def _sparse(information: Floats, pull: Floats, price: float) -> Floats:
+    """Indices of the terms kept: thresholded least squares, at each threshold, the best by BIC; columns of size one."""
+    from pysindy import STLSQ  # takes seconds to import, and is seldom needed
+
+    root = np.linalg.cholesky(information + 1e-8 * np.trace(information) / len(pull) * np.eye(len(pull)))
+    target = -np.linalg.solve(root, pull)
+    best, chosen = 0.0, np.empty(0, int)
+    for threshold in THRESHOLDS:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # it warns when it drops everything, which is an answer
+            model = STLSQ(threshold=threshold, alpha=1e-6, max_iter=50).fit(root.T, target[:, None])
+        support = np.flatnonzero(np.ravel(model.coef_))
+        if not 0 < len(support) <= MOST_TERMS:
+            continue
+        gain = 0.5 * float(pull[support] @ np.linalg.solve(information[np.ix_(support, support)], pull[support]))
+        if gain - 0.5 * len(support) * price > best:
+            best, chosen = gain - 0.5 * len(support) * price, support
+    return np.asarray(chosen)
+
+
+def propose(space: Space, held_out: Likelihood, iterations: int = 12) -> Proposal | None:
+    """The formula, on all movers or on one, that predicts held-out episodes best; None where none of them gains.
+
+    `held_out`: other episodes of the space's simulator, with the same prior.
+    """
+    movers = space.pushes.movers
+    sets = [movers] if len(movers) < 2 else [movers, *((m,) for m in movers)]
+    found = [formula for formula in (regress(space, objects) for objects in sets) if formula is not None]
+    if not found:
+        return None
+    formula = max(found, key=lambda f: f.gain - 5.0 * len(f.terms))
+    joint = fit_jointly(space, [formula.score], iterations)
+    fitted = joint.fit.point.values[-len(formula.terms) :]
+    formula = Formula(formula.terms, fitted, formula.gain, formula.score)
+    before = _excess(held_out, space.fit.point.values)
+    after = _excess(_with(held_out, joint), joint.fit.point.values)
+    gain = 1 - after / before if before > 0 else 0.0
+    if gain < KEPT:
+        return None
+    objects = " and ".join(formula.score.candidate.attached.objects)
+    sentence = f"A formula is proposed for {objects}, not named: {formula.text} (SI; held-out excess -{gain:.0%})."
+    return Proposal(formula, joint, gain, sentence)
+
+
+def _with(held_out: Likelihood, joint: Joint) -> Likelihood:
+    """The held-out episodes as the wider simulator predicts them."""
+    fitted = joint.likelihood
+    return Likelihood(
+        fitted.predict, fitted.parameters, held_out.inputs, held_out.time_s, held_out.measured, held_out.sigma,
+        held_out.correlation_time, held_out.launch_std, fitted.prior_mean, fitted.prior_std,
+    )  # fmt: skip
+
+
+def _excess(likelihood: Likelihood, values: Floats) -> float:
+    """Mean squared residual above one, the noise floor."""
+    point = Point(values, np.zeros_like(likelihood.inputs), np.inf)
+    measured = ~np.isnan(likelihood.measured)
+    return float(np.mean(residual_at(likelihood, point)[measured] ** 2)) - 1.0
