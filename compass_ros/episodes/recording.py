@@ -176,6 +176,11 @@ class Recorder:
         """Messages of the present episode by topic."""
         return self._writer.counts() if self._writer is not None else {}
 
+    @property
+    def lost(self) -> int:
+        """Messages that the present (or last) episode did not get."""
+        return sum(self._losses.lost.values())
+
     def problems(self) -> tuple[str, ...]:
         """What went wrong in the present (or last) episode, one sentence each."""
         lost = [f"lost {count} messages on {topic}" for topic, count in sorted(self._losses.lost.items())]

@@ -2,60 +2,72 @@
 
 Poses carry the stamp of their image, which is the middle of its exposure in the sensor's clock. An object that is seen
 is published as measured; one that is hidden is published as predicted, with a standard deviation of at least
-`bridged_std_m` that grows, and no longer after `bridge_s`.
+`bridged_std_m` that grows, and no longer after `bridge_s`. A watchdog says so when the camera stops, the table moves or
+an object is lost.
 """
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from rcl_interfaces.msg import SetParametersResult
-from rclpy.node import Node
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from sensor_msgs.msg import CameraInfo, Image
+from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from compass_ros.errors import CompassError
 from compass_ros.nodes import images
+from compass_ros.nodes.managed import ManagedNode
 from compass_ros.nodes.run import run
+from compass_ros.nodes.tracker_health import Counts, StampGaps, health_message
 from compass_ros.nodes.tracker_parameters import declare_tracker, tracker_of
 from compass_ros.tracking.camera import CameraModel
 from compass_ros.tracking.draw import annotate
 from compass_ros.tracking.tracker import Frame, TrackerState, step, use_one_core
+from compass_ros.tracking.watchdog import Watch, accept, complaints, look
 
 SENSOR_IN = QoSProfile(depth=30, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Half a second of images may wait while the machine is busy elsewhere; none is lost before."""
 DEBUG_EVERY = 4
 """One image in this many is annotated."""
+WATCH_PERIOD_S = 0.25
+DIAGNOSTICS_PERIOD_S = 1.0
 
 
-@dataclass
-class Counts:
-    """Since the last diagnostics."""
-
-    images: int = 0
-    missed: int = 0
-    unusable: int = 0
-    busy_s: float = 0.0
-    seen: dict[str, int] = field(default_factory=dict)
-
-
-class PuckTracker(Node):
+class PuckTracker(ManagedNode):
     """Image in, poses out; the work is `compass_ros.tracking.tracker.step`."""
 
     def __init__(self) -> None:
         super().__init__("puck_tracker")
         self._config = declare_tracker(self)
+        self._camera_timeout_s = self._limit("camera_timeout_s", 0.5, "the camera has stopped after this [s]", 60.0)
+        self._moved_m = self._limit("moved_m", 0.002, "a table that is farther from its place has moved [m]", 1.0)
+        self._lost_s = self._limit("lost_s", 2.0, "an object that is not seen for longer is lost [s]", 3600.0)
+        self._forget()
+        self.add_on_set_parameters_callback(self._on_parameters)
+
+    def _limit(self, name: str, default: float, text: str, most: float) -> float:
+        limits = [FloatingPointRange(from_value=0.0, to_value=most)]
+        described = ParameterDescriptor(description=f"watchdog: {text}", floating_point_range=limits)
+        return float(self.declare_parameter(name, default, described).value)
+
+    def _forget(self) -> None:
         self._state = TrackerState()
+        self._watch = Watch()
         self._camera: CameraModel | None = None
         self._problem = "no image yet"
+        self._warned: set[str] = set()
         self._counts = Counts()
-        self._period_ns: int | None = None
+        self._gaps = StampGaps()
+        self._heard_s = self._diagnosed_s = time.monotonic()
 
+    def configure(self) -> None:
+        self._forget()
         self._poses = {
             name: self.create_publisher(PoseWithCovarianceStamped, f"~/{name}/pose", qos_profile_sensor_data)
             for name in self._config.objects
@@ -65,8 +77,12 @@ class PuckTracker(Node):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.create_subscription(CameraInfo, "camera_info", self._on_camera, qos_profile_sensor_data)
         self.create_subscription(Image, "image", self._on_image, SENSOR_IN)
-        self.create_timer(1.0, self._diagnose)
-        self.add_on_set_parameters_callback(self._on_parameters)
+        self.create_service(Trigger, "~/accept_table", self._on_accept)
+        self.create_timer(WATCH_PERIOD_S, self._on_watch)
+        self.create_timer(DIAGNOSTICS_PERIOD_S, self._diagnose)
+
+    def activate(self) -> None:
+        self._heard_s = time.monotonic()
 
     def _on_parameters(self, changes: list[Parameter]) -> SetParametersResult:
         try:
@@ -74,8 +90,12 @@ class PuckTracker(Node):
         except CompassError as error:
             return SetParametersResult(successful=False, reason=str(error))
         if config.fiducials != self._config.fiducials:
-            self._state = TrackerState()
+            self._state, self._watch = TrackerState(), Watch()
         self._config = config
+        given = {change.name: change.value for change in changes}
+        self._camera_timeout_s = given.get("camera_timeout_s", self._camera_timeout_s)
+        self._moved_m = given.get("moved_m", self._moved_m)
+        self._lost_s = given.get("lost_s", self._lost_s)
         return SetParametersResult(successful=True)
 
     def _on_camera(self, message: CameraInfo) -> None:
@@ -84,10 +104,14 @@ class PuckTracker(Node):
         except CompassError as error:
             self._complain(str(error))
 
-    def _on_image(self, message: Image) -> None:
+    def _on_image(self, message: Image, info: Mapping[str, int]) -> None:
+        if not self.active:
+            return
         started = time.perf_counter()
+        self._heard_s = time.monotonic()
         stamp_ns = images.stamp_ns(message.header.stamp)
-        self._count(stamp_ns)
+        self._counts.images += 1
+        self._counts.missed += self._gaps.take(stamp_ns)
         if self._camera is None:
             self._complain("no camera_info yet: images wait for it")
             return
@@ -99,6 +123,10 @@ class PuckTracker(Node):
             return
         self._complain(frame.problem)
         self._publish(frame)
+        self._counts.latency_ms.append(1e-6 * (time.time_ns() - info["received_timestamp"]))
+        self._counts.age_ms.append(1e-6 * (self.get_clock().now().nanoseconds - stamp_ns))
+        self._counts.take(frame)
+        self._watch = look(self._watch, self._state, frame, self._config.fiducials)
         self._counts.busy_s += time.perf_counter() - started
         if self._counts.images % DEBUG_EVERY == 0 and self._debug.get_subscription_count():
             seen = annotate(bgr, self._state, frame, self._config)
@@ -107,19 +135,8 @@ class PuckTracker(Node):
     def _publish(self, frame: Frame) -> None:
         for sighting in frame.sightings:
             self._poses[sighting.object].publish(images.pose_message(sighting))
-            self._counts.seen[sighting.object] = self._counts.seen.get(sighting.object, 0) + sighting.seen
         if self._markers.get_subscription_count():
             self._markers.publish(images.markers_message(frame.sightings, self._config, frame.stamp_ns))
-
-    def _count(self, stamp_ns: int) -> None:
-        """Images, and gaps in their stamps: the least period seen is the camera's."""
-        self._counts.images += 1
-        last = self._state.stamp_ns
-        if last is None or stamp_ns <= last:
-            return
-        gap = stamp_ns - last
-        self._period_ns = gap if self._period_ns is None else min(gap, self._period_ns)
-        self._counts.missed += round(gap / self._period_ns) - 1
 
     def _complain(self, problem: str) -> None:
         """Say a problem once, when it begins; count the images that it costs."""
@@ -132,23 +149,41 @@ class PuckTracker(Node):
                 self.get_logger().info(f"table found, reprojection error {self._state.fix.residual_px:.2f} px")
         self._problem = problem
 
+    def _alarms(self) -> list[str]:
+        """What the watchdog says now."""
+        silent_s = time.monotonic() - self._heard_s
+        if silent_s > self._camera_timeout_s:
+            return [f"the camera has stopped: no images for {silent_s:.1f} s"]
+        return list(complaints(self._watch, self._config.objects, self._moved_m, self._lost_s))
+
+    def _on_watch(self) -> None:
+        """Say each alarm once, when it begins."""
+        alarms = {alarm.split(":", maxsplit=1)[0].split(" by ")[0]: alarm for alarm in self._alarms()}
+        if not self.active:
+            return
+        for kind in alarms.keys() - self._warned:
+            self.get_logger().warning(alarms[kind])
+        for kind in self._warned - alarms.keys():
+            self.get_logger().info(f"over: {kind}")
+        self._warned = set(alarms)
+
+    def _on_accept(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        moved_mm = 1e3 * self._watch.moved_m
+        self._watch = accept(self._watch)
+        response.success = True
+        response.message = f"accepted: the table may stand where it stands, {moved_mm:.1f} mm from where it was"
+        return response
+
     def _diagnose(self) -> None:
         counts, self._counts = self._counts, Counts()
-        problem = self._problem if counts.images else "no images"
-        values = {
-            "images": counts.images,
-            "missed images": counts.missed,
-            "unusable images": counts.unusable,
-            "ms an image": f"{1e3 * counts.busy_s / max(counts.images, 1):.2f}",
-            "reprojection error [px]": f"{self._state.fix.residual_px:.3f}",
-            **{f"seen {name}": counts.seen.get(name, 0) for name in self._config.objects},
-        }
-        status = DiagnosticStatus(
-            level=DiagnosticStatus.WARN if problem else DiagnosticStatus.OK,
-            name=f"{self.get_name()}: tracking",
-            message=problem or "tracking",
-            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
-        )
+        now_s = time.monotonic()
+        seconds, self._diagnosed_s = now_s - self._diagnosed_s, now_s
+        if self.active:
+            problems = [*self._alarms(), *filter(None, [self._problem])]
+        else:
+            problems = [f"not active, but {self.state}"]
+        residual_px = self._state.fix.residual_px
+        status = health_message(self.get_name(), counts, seconds, residual_px, self._config.objects, problems)
         head = images.header(self.get_clock().now().nanoseconds, "")
         self._diagnostics.publish(DiagnosticArray(header=head, status=[status]))
 

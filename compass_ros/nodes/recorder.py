@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import rclpy
-from builtin_interfaces.msg import Duration, Time
 from compass_interfaces.msg import EpisodeInfo
 from compass_interfaces.srv import StartEpisode, StopEpisode
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.executors import ExternalShutdownException
-from rclpy.node import Node
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
-from compass_ros.episodes.notes import STATES, EpisodeHeader
 from compass_ros.episodes.recording import Recorder
 from compass_ros.episodes.writer import sync_bag
-from compass_ros.errors import BagError, CompassError
+from compass_ros.errors import BagError
+from compass_ros.nodes.managed import ManagedNode
+from compass_ros.nodes.recorder_messages import episode_message, health_message
+from compass_ros.nodes.requests import checked_action, checked_text
+from compass_ros.nodes.run import run
 from compass_ros.nodes.topic_watch import TopicWatch
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -30,12 +27,32 @@ STATUS_PERIOD_S = 1.0
 DEFAULT_TOPICS = ["/puck_tracker/puck1/pose", "/puck_tracker/puck2/pose", "/virtual_cell/shot"]
 
 
-class RecorderNode(Node):
-    """Receives from the moment it starts, and writes while an episode runs: to start one takes no discovery."""
+class RecorderNode(ManagedNode):
+    """Receives from the moment it is active, and writes while an episode runs: to start one takes no discovery.
+
+    Configured it holds its folder. It cannot be deactivated while an episode runs. When it is shut down in an episode,
+    the bag stays without an end and can be recovered.
+    """
 
     def __init__(self) -> None:
         super().__init__("recorder")
+        self._recorder: Recorder | None = None
         self._declare()
+
+    def _declare(self) -> None:
+        declare = self.declare_fixed
+        declare(
+            "topics", DEFAULT_TOPICS, "names of the topics to record, of any type; relative ones are in the namespace"
+        )
+        declare("directory", "out/episodes", "folder of the bags; this node holds it alone")
+        declare("depth", 1000, "messages of a topic that wait here when the disk is slow [count]")
+        declare("min_free_mb", 500, "an episode is not started with less on the disk [MB]")
+        declare("max_duration_s", 600, "an episode that nobody stops is ended after this [s]; 0: never")
+        declare("cell", "", "name of the cell, where the start service does not say it")
+        declare("cell_hash", "", "hash of the cell's configuration, where the start service does not say it")
+
+    def configure(self) -> None:
+        """Raises BagError: the folder cannot be written, or another recorder holds it."""
         self._recorder = Recorder(
             Path(self._text("directory")).expanduser(),
             min_free_bytes=self._whole("min_free_mb") * 10**6,
@@ -54,24 +71,28 @@ class RecorderNode(Node):
             connected=self._recorder.connect,
             received=self._on_message,
         )
-        self.create_timer(DISCOVERY_PERIOD_S, self._watch.update)
+        self._received = 0
+        self.create_timer(DISCOVERY_PERIOD_S, self._on_discovery)
         self.create_timer(STATUS_PERIOD_S, self._on_tick)
         if self._recorder.status.message:
             self.get_logger().warning(self._recorder.status.message)
 
-    def _declare(self) -> None:
-        def declare(name: str, default: object, text: str) -> None:
-            self.declare_parameter(name, default, ParameterDescriptor(description=text, read_only=True))
+    def deactivate(self) -> None:
+        """Raises BagError while an episode runs."""
+        if self._running.recording:
+            raise BagError(f"episode {self._running.status.episode} is being recorded; stop or discard it first")
 
-        declare(
-            "topics", DEFAULT_TOPICS, "names of the topics to record, of any type; relative ones are in the namespace"
-        )
-        declare("directory", "out/episodes", "folder of the bags; this node holds it alone")
-        declare("depth", 1000, "messages of a topic that wait here when the disk is slow [count]")
-        declare("min_free_mb", 500, "an episode is not started with less on the disk [MB]")
-        declare("max_duration_s", 600, "an episode that nobody stops is ended after this [s]; 0: never")
-        declare("cell", "", "name of the cell, where the start service does not say it")
-        declare("cell_hash", "", "hash of the cell's configuration, where the start service does not say it")
+    def cleanup(self) -> None:
+        if self._recorder is not None:
+            self._recorder.close()
+            self._syncing.shutdown()
+        self._recorder = None
+
+    @property
+    def _running(self) -> Recorder:
+        if self._recorder is None:
+            raise BagError("the recorder is not configured")
+        return self._recorder
 
     def _text(self, name: str) -> str:
         return str(self.get_parameter(name).value)
@@ -82,19 +103,26 @@ class RecorderNode(Node):
     def _now_ns(self) -> int:
         return int(self.get_clock().now().nanoseconds)
 
+    def _on_discovery(self) -> None:
+        if self.active:
+            self._watch.update()
+
     def _on_message(self, topic: str, data: bytes, published_ns: int, sequence: int | None) -> None:
+        self._received += 1
         try:
-            self._recorder.take(topic, data, self._now_ns(), published_ns, sequence)
+            self._running.take(topic, data, self._now_ns(), published_ns, sequence)
         except BagError:
-            self.get_logger().error(self._recorder.status.message)
+            self.get_logger().error(self._running.status.message)
             self._say()
 
     def _on_start(self, request: StartEpisode.Request, response: StartEpisode.Response) -> StartEpisode.Response:
         try:
-            cell, cell_hash = request.cell or self._text("cell"), request.cell_hash or self._text("cell_hash")
-            action = dict(zip(request.action_names, request.action_values, strict=True))
-            status = self._recorder.start(request.episode, cell, cell_hash, action, self._now_ns())
-        except (BagError, ValueError) as error:
+            if not self.active:
+                raise BagError(f"the recorder is {self.state}; activate it first")
+            cell = checked_text(request.cell, "cell") or self._text("cell")
+            cell_hash = checked_text(request.cell_hash, "cell_hash") or self._text("cell_hash")
+            status = self._running.start(request.episode, cell, cell_hash, checked_action(request), self._now_ns())
+        except BagError as error:
             response.message = str(error)
             return response
         response.success, response.bag, response.message = True, status.bag, f"recording {status.episode}"
@@ -104,19 +132,19 @@ class RecorderNode(Node):
     def _on_stop(self, request: StopEpisode.Request, response: StopEpisode.Response) -> StopEpisode.Response:
         del request  # empty
         try:
-            status = self._recorder.stop()
+            status = self._running.stop()
             response.success, response.message = True, status.message
             self._say()
             self._syncing.submit(sync_bag, Path(status.bag))
         except BagError as error:
             response.message = str(error)
-        response.info = _message(self._recorder.status)
+        response.info = episode_message(self._running.status)
         return response
 
     def _on_discard(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         del request  # empty
         try:
-            status = self._recorder.discard()
+            status = self._running.discard()
             response.success, response.message = True, f"discarded {status.episode}"
             self._say()
         except BagError as error:
@@ -124,80 +152,45 @@ class RecorderNode(Node):
         return response
 
     def _on_tick(self) -> None:
-        if self._recorder.overdue(self._now_ns()):
+        if self._running.overdue(self._now_ns()):
             try:
-                self._recorder.stop(f"ended by itself after {self._whole('max_duration_s')} s")
+                self._running.stop(f"ended by itself after {self._whole('max_duration_s')} s")
             except BagError as error:
                 self.get_logger().error(str(error))
             self._say()
-        elif self._recorder.recording:
+        elif self._running.recording:
             self._say()
         self._diagnose()
 
     def _say(self) -> None:
-        self._status_topic.publish(_message(self._recorder.progress()))
+        self._status_topic.publish(episode_message(self._running.progress()))
 
     def _diagnose(self) -> None:
-        status = self._recorder.progress()
-        missing = self._watch.problems()
-        values = {"state": status.state, "episode": status.episode, **self._recorder.counts()}
+        status = self._running.progress()
+        problems = list(self._watch.problems())
+        values = {
+            "state": status.state,
+            "episode": status.episode,
+            "messages received in the last second": self._received,
+            "lost messages": self._running.lost,
+            **self._running.counts(),
+        }
+        self._received = 0
         try:
-            values["free on disk [MB]"] = self._recorder.free_bytes() // 10**6
+            values["free on disk [MB]"] = free = self._running.free_bytes() // 10**6
+            if free < self._whole("min_free_mb"):
+                problems.append(f"{free} MB left on the disk, {self._whole('min_free_mb')} MB are asked for")
         except BagError as error:
-            missing = (*missing, str(error))
-        problems = [*missing, *filter(None, [status.message])]
-        level = DiagnosticStatus.ERROR if status.state == "failed" else DiagnosticStatus.WARN
-        report = DiagnosticStatus(
-            level=level if problems else DiagnosticStatus.OK,
-            name=f"{self.get_fully_qualified_name()}: episodes",
-            message="; ".join(problems) or status.state,
-            values=[KeyValue(key=str(key), value=str(value)) for key, value in values.items()],
-        )
+            problems.append(str(error))
+        report = health_message(self.get_fully_qualified_name(), status, values, problems)
         stamped = DiagnosticArray(status=[report])
         stamped.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics_topic.publish(stamped)
 
-    def destroy_node(self) -> None:
-        self._recorder.close()
-        self._syncing.shutdown()
-        super().destroy_node()
 
-
-def _message(status: EpisodeHeader) -> EpisodeInfo:
-    message = EpisodeInfo(
-        state=STATES.index(status.state),
-        episode=status.episode,
-        cell=status.cell,
-        cell_hash=status.cell_hash,
-        bag=status.bag,
-        messages=status.messages,
-        topics=list(status.topics),
-        message=status.message,
-    )
-    message.header.frame_id = "table"
-    message.header.stamp = Time(sec=status.start_ns // 10**9, nanosec=status.start_ns % 10**9)
-    message.duration = Duration(sec=status.duration_ns // 10**9, nanosec=status.duration_ns % 10**9)
-    return message
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the node until it is told to end; an episode that runs then stays without an end and can be recovered."""
-    rclpy.init(args=arguments)
-    try:
-        node = RecorderNode()
-    except CompassError as error:
-        rclpy.logging.get_logger("recorder").fatal(str(error))
-        rclpy.try_shutdown()
-        return 1
-    try:
-        rclpy.spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
+def main() -> None:
+    run(RecorderNode, "recorder")
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    main()

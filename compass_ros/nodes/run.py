@@ -1,4 +1,4 @@
-"""How a node with a single thread lives and ends."""
+"""How a node lives and ends."""
 
 from __future__ import annotations
 
@@ -8,18 +8,21 @@ import threading
 from collections.abc import Callable
 
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from compass_ros.errors import CompassError
+from compass_ros.nodes.managed import ManagedNode
 
 NOTICE_S = 0.2
 """[s] How soon an idle node notices that it is told to end."""
 
 
-def run(make: Callable[[], Node], name: str) -> None:
+def run(make: Callable[[], Node], name: str, threads: int = 1) -> None:
     """Spin a node until it is told to end. A node that cannot start says why in one line, with exit status 1.
+
+    A managed node starts by itself where its parameter says so, and ends as by the transition `shutdown`.
 
     Signals end the loop between two callbacks, before the context is closed: no callback finds its publishers gone.
     An exception that a signal raises inside of rclpy could surface as anything; so a signal only leaves a note.
@@ -28,11 +31,16 @@ def run(make: Callable[[], Node], name: str) -> None:
     told = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: told.set())
-    executor = SingleThreadedExecutor()
+    executor = MultiThreadedExecutor(threads) if threads > 1 else SingleThreadedExecutor()
     try:
-        executor.add_node(make())
+        node = make()
+        executor.add_node(node)
+        if isinstance(node, ManagedNode):
+            node.start()
         while not told.is_set():
             executor.spin_once(timeout_sec=NOTICE_S)
+        if isinstance(node, ManagedNode):
+            node.end()
     except CompassError as error:
         sys.exit(f"{name}: {error}")
     finally:

@@ -13,6 +13,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, SetParameters
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, Image
+from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from compass_ros.nodes.images import (
@@ -129,6 +130,33 @@ def test_trouble_is_said_once_in_one_line_and_passes(
     until(lambda: bool(send()) and len(heard) > count, 10, "a pose after a bad image")
     assert tracker.stop() == 0
     assert "Traceback" not in tracker.output()
+
+
+def test_the_watchdog_says_each_alarm_once(
+    probe: Probe, tracker: NodeProcess, send: Send, camera: VirtualCamera
+) -> None:
+    diagnostics = probe.listen(DiagnosticArray, "/diagnostics")
+
+    def said(text: str) -> bool:
+        return bool(diagnostics) and text in diagnostics[-1].status[0].message
+
+    until(lambda: "the camera has stopped: no images for" in tracker.output(), 5, "a camera that never spoke")
+    until(lambda: bool(send()) and said("tracking"), 15, "all is well")
+    values = {pair.key: pair.value for pair in diagnostics[-1].status[0].values}
+    assert float(values["share of images with puck1"]) > 0.9
+    assert 0 < float(values["latency p50 [ms]"]) <= float(values["latency p99 [ms]"]) < 1000
+    until(lambda: tracker.output().count("over: the camera has stopped") == 1, 5, "the end of the first alarm")
+    until(lambda: said("the camera has stopped"), 5, "the camera's silence")
+    assert tracker.output().count("the camera has stopped: no images") == 2
+
+    gone = {name: xy for name, xy in PLACES.items() if name != "puck1"}
+    until(lambda: bool(send(places=gone)) and said("puck1 is lost: not seen for"), 20, "the loss of a puck")
+    picture = render(camera, {name: np.tile([*xy, 0.0], (5, 1)) for name, xy in PLACES.items()}, 1)
+    pushed = np.roll(picture, 4, axis=1)  # the camera is turned by four pixels
+    until(lambda: bool(send(pushed)) and said("the table has moved by"), 20, "the push")
+    assert "accepted: the table may stand" in probe.call(Trigger, "/puck_tracker/accept_table").message
+    until(lambda: bool(send(pushed)) and said("tracking"), 20, "the end of the alarm")
+    assert tracker.output().count("the table has moved by") == 1
 
 
 def test_bad_parameters_at_the_start_end_it_with_one_line(start_node: StartNode) -> None:

@@ -99,8 +99,20 @@ def test_discard_and_names(recorder: NodeProcess, probe: Probe, tmp_path: Path) 
         answer = timed(probe, StartEpisode, "/recorder/start_episode", StartEpisode.Request(episode=name))
         assert not answer.success
         assert "episode name" in answer.message
-    uneven = StartEpisode.Request(action_names=["a", "b"], action_values=[1.0])
-    assert not timed(probe, StartEpisode, "/recorder/start_episode", uneven).success
+    for hostile, words in (
+        ({"action_names": ["a", "b"], "action_values": [1.0]}, "found 2 names (2 distinct) and 1 values"),
+        ({"action_names": ["a", "a"], "action_values": [1.0, 2.0]}, "found 2 names (1 distinct)"),
+        ({"action_names": ["a"], "action_values": [float("nan")]}, "a: expected a finite number, found nan"),
+        ({"action_names": ["a\n"], "action_values": [1.0]}, "action: expected up to 200 printable letters"),
+        ({"cell": "air_hockey\n[FATAL] all is lost"}, "cell: expected up to 200 printable letters"),
+        ({"cell_hash": "f" * 100_000}, "cell_hash: expected up to 200 printable letters"),
+        ({"episode": "e" * 1_000_000}, "episode name 'eee"),
+    ):
+        answer = probe.call(StartEpisode, "/recorder/start_episode", StartEpisode.Request(**hostile))
+        assert not answer.success
+        assert words in answer.message
+        assert "\n" not in answer.message
+        assert len(answer.message) < 300
     assert timed(probe, StartEpisode, "/recorder/start_episode", StartEpisode.Request(episode="mine")).success
     assert timed(probe, Trigger, "/recorder/discard_episode").message == "discarded mine"
     assert not timed(probe, StopEpisode, "/recorder/stop_episode").success
