@@ -79,6 +79,7 @@ setup(
         "pysindy",
         "pyyaml",
         "rich",
+        "robosuite",
         "rosbags",
         "sbi",
         "scipy",
