@@ -25,6 +25,7 @@ JOINS = {
     "commands": 5,
     "cli": 6,
     "nodes": 6,
+    "program": 7,
 }
 LAYERS = {"types": 0, "errors": 0, "config": 1, **dict.fromkeys(STEPS, 2), **JOINS}
 """A module imports from lower layers, or from its own part."""
@@ -46,12 +47,22 @@ HOME = {library: parts for libraries, parts in HOMES.items() for library in libr
 GUESTS = {"calibration/rivals/mujoco_sysid.py": {"mujoco"}}
 """Single modules that may import a library away from its home: this rival is MuJoCo's own system identification."""
 
-NEIGHBOURS = {("simulation", "cells"), ("discovery", "simulation"), ("discovery", "calibration")}
+PROGRAMS = {"concealed/blind.py"}
+"""Modules that are processes of their own: they may call the command line, and nobody imports them."""
+
+NEIGHBOURS = {
+    ("simulation", "cells"),
+    ("discovery", "cells"),
+    ("discovery", "simulation"),
+    ("discovery", "calibration"),
+}
 """Steps of one layer that know each other: what is simulated is a cell, and an effect is part of a simulator."""
 
 
 def part_of(path: Path) -> str:
     """The first name under compass_ros: a folder or a module; the package itself is '__init__'."""
+    if str(path.relative_to(PACKAGE)) in PROGRAMS:
+        return "program"
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
@@ -100,6 +111,13 @@ def test_module_imports_downwards_and_from_its_own_libraries(path: Path) -> None
 )
 def test_the_rules_notice_each_kind_of_breach(part: str, source: str) -> None:
     assert len(complaints(part, ast.parse(source))) == 1
+
+
+def test_nobody_imports_a_program() -> None:
+    programs = {f"compass_ros.{name.removesuffix('.py').replace('/', '.')}" for name in PROGRAMS}
+    for path in MODULES:
+        imported = set(imports(ast.parse(path.read_text(encoding="utf-8"))))
+        assert not any(f"{name}.".startswith(f"{program}.") for name in imported for program in programs), path
 
 
 def test_the_rules_allow_what_is_allowed() -> None:

@@ -124,8 +124,8 @@ def test_progress_has_the_time_that_is_left() -> None:
 
 
 def test_command_hands_on_everything() -> None:
-    request = Request(bags=("a", "b"), cell="air_hockey", seed=3, rollouts=0, output=Path("out"))
-    words = ["--cell", "air_hockey", "--out", "tmp", "--seed", "3", "--progress", "json"]
+    request = Request(bags=("a", "b"), cell="air_hockey", seed=3, rollouts=0, output=Path("out"), method="compass")
+    words = ["--cell", "air_hockey", "--out", "tmp", "--method", "compass", "--seed", "3", "--progress", "json"]
     assert command(request, Path("tmp"))[3:] == ["calibrate", *words, "--", "a", "b"]
     budget = Request(bags=("a",), cell="x.yaml", seed=0, rollouts=500, output=Path("out"))
     assert command(budget, Path("tmp"))[-4:] == ["--rollouts", "500", "--", "a"]
