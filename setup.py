@@ -76,7 +76,6 @@ setup(
         "opencv-python",
         "openpyxl",
         "pydantic>=2",
-        "pysindy",
         "pyyaml",
         "rich",
         "robosuite",

@@ -34,7 +34,6 @@ HOMES = {
     ("mujoco", "robosuite"): {"simulation", "cells", "concealed"},
     ("torch",): {"calibration", "policy"},
     ("cv2",): {"tracking"},
-    ("pysindy",): {"discovery"},
     ("rosbags", "mcap", "mcap_ros2"): {"episodes"},
     ("rclpy", "launch", "launch_ros", "ament_index_python", "rcl_interfaces", "action_msgs"): {"nodes"},
     ("builtin_interfaces", "std_msgs", "std_srvs", "sensor_msgs", "geometry_msgs"): {"nodes"},
