@@ -101,7 +101,9 @@ def play(plan: Plan, nodes: NodeGroup, report: Report) -> Played:
 
 def calibrate(plan: Plan, nodes: NodeGroup, report: Report) -> None:
     """Let the calibrator work on the bags; the result lies in `plan.result`."""
-    calibrator = nodes.start("calibrator", method=plan.method)
+    calibrator = nodes.start(
+        "calibrator", method=plan.method, output=str(plan.result), versions=str(plan.out / "versions")
+    )
     client = nodes.start(
         "calibration_client",
         pipe=True,

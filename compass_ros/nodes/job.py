@@ -23,8 +23,14 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import IO
 
+import yaml
+
 from compass_ros.errors import ConfigError
+from compass_ros.nodes.journal import Journal
 from compass_ros.types import Progress
+
+ORIGIN = "origin.yaml"
+"""What a result came from, beside it."""
 
 
 class Outcome(Enum):
@@ -48,6 +54,16 @@ class Request:
     output: Path
     """Folder of the result. It is made, or replaced where it holds an earlier result; nothing else is overwritten."""
     method: str = "default"
+
+    def described(self) -> dict[str, object]:
+        """What a result came from, for people and for a second try."""
+        return {
+            "bags": list(self.bags),
+            "cell": self.cell,
+            "seed": self.seed,
+            "rollouts": self.rollouts,
+            "method": self.method,
+        }
 
 
 @dataclass(frozen=True)
@@ -92,8 +108,19 @@ def read_step(line: bytes, elapsed_s: float) -> Step:
 class Job:
     """A running calibration. `finished` is set when `outcome` and `message` are final."""
 
-    def __init__(self, words: Sequence[str], folder: Path, result: Path, output: Path) -> None:
-        """Start `words`, which leave their result in the folder `result` inside `folder`; it becomes `output`."""
+    def __init__(
+        self,
+        words: Sequence[str],
+        folder: Path,
+        result: Path,
+        output: Path,
+        request: Request | None = None,
+        journal: Journal | None = None,
+    ) -> None:
+        """Start `words`, which leave their result in the folder `result` inside `folder`; it becomes `output`.
+
+        `request` joins the result as origin.yaml. Raises ConfigError where the process cannot be started.
+        """
         self.finished = threading.Event()
         self.outcome = Outcome.FAILED
         self.message = ""
@@ -106,15 +133,32 @@ class Job:
         self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  closed by the thread below
         self._started = time.monotonic()
         # A session of its own: the terminal's Ctrl-C reaches the node alone, and the whole group can be ended.
-        self._process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=self._errors, start_new_session=True)
+        try:
+            self._process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=self._errors, start_new_session=True)
+        except OSError as error:
+            raise ConfigError(f"the calibration cannot be started: {error.strerror}") from error
+        self._request = request
+        self._journal = journal
+        if journal is not None:
+            journal.begun(self._process.pid, folder)
         threading.Thread(target=self._follow, name="calibration").start()
 
     @classmethod
     def start(cls, request: Request) -> Job:
-        """Raises ConfigError where the output cannot be written."""
+        """Raises ConfigError where the output cannot be written, or another calibration writes there."""
         output = request.output.expanduser().absolute()
-        folder = prepare(output)
-        return cls(command(request, folder / "result"), folder, folder / "result", output)
+        journal = Journal(output, request.described())
+        try:
+            folder = prepare(output)
+            words = command(request, folder / "result")
+            try:
+                return cls(words, folder, folder / "result", output, request, journal)
+            except ConfigError:
+                shutil.rmtree(folder)
+                raise
+        except ConfigError:
+            journal.close()
+            raise
 
     def steps(self) -> list[Step]:
         """Progress since the last call, oldest first."""
@@ -142,15 +186,20 @@ class Job:
         with self._decision:
             self.outcome, self.message = self._end(status, error or (said[-1] if said else "it said nothing"))
             shutil.rmtree(self._folder)
+            if self._journal is not None:
+                self._journal.close()
             self.finished.set()
 
     def _read(self, lines: IO[bytes]) -> str:
         """Progress until the process closes its output; or a sentence about a line that is no progress."""
         for line in lines:
             try:
-                self._steps.put(read_step(line, time.monotonic() - self._started))
+                step = read_step(line, time.monotonic() - self._started)
             except (ValueError, KeyError, TypeError):
                 return f"expected progress as JSON, found {line!r}"
+            self._steps.put(step)
+            if self._journal is not None:
+                self._journal.note(step.progress.stage, step.progress.iteration)
         return ""
 
     def _end(self, status: int, error: str) -> tuple[Outcome, str]:
@@ -160,7 +209,13 @@ class Job:
             return Outcome.FAILED, error.removeprefix("compass: ")
         if status:
             return Outcome.FAILED, f"the calibration process ended with status {status}: {error}"
-        if self.output.exists():
-            self.output.rename(self._folder / "earlier")
-        self._result.rename(self.output)
+        try:
+            if self._request is not None:
+                text = yaml.safe_dump(self._request.described(), sort_keys=False)
+                (self._result / ORIGIN).write_text(text, encoding="utf-8")
+            if self.output.exists():
+                self.output.rename(self._folder / "earlier")
+            self._result.rename(self.output)
+        except OSError as problem:
+            return Outcome.FAILED, f"output: {self.output} cannot be written: {problem.strerror}"
         return Outcome.SUCCEEDED, f"result in {self.output}"

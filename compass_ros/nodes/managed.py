@@ -53,6 +53,10 @@ class ManagedNode(LifecycleNode):
     def declare_fixed(self, name: str, default: object, text: str, **extra: object) -> None:
         """A parameter that may change only while the node is not configured."""
         self._fixed.add(name)
+        self.declare_described(name, default, text, **extra)
+
+    def declare_described(self, name: str, default: object, text: str, **extra: object) -> None:
+        """A parameter that may change at any time; `extra`: further fields of its descriptor."""
         self.declare_parameter(name, default, ParameterDescriptor(description=text, **extra))
 
     def start(self) -> None:

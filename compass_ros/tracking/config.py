@@ -17,6 +17,8 @@ from compass_ros.config import read_yaml
 from compass_ros.errors import ConfigError, nearest
 
 _strict = ConfigDict(extra="forbid")
+_OF_THE_NODE = frozenset({"object_names", "autostart", "camera_timeout_s", "moved_m", "lost_s"})
+"""What a parameter file says to the node and not to the tracker."""
 
 
 @dataclass(frozen=True, config=_strict)
@@ -105,4 +107,4 @@ def read_tracker_config(path: Path) -> TrackerConfig:
         inner = content.get(wrapper)
         if isinstance(inner, Mapping):
             content = inner
-    return tracker_config({key: value for key, value in content.items() if key != "object_names"}, str(path))
+    return tracker_config({key: value for key, value in content.items() if key not in _OF_THE_NODE}, str(path))

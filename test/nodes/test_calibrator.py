@@ -187,7 +187,10 @@ def test_every_parameter_says_what_it_is(start_node: StartNode, probe: Probe) ->
     start_node("calibrator")
     listed = probe.call(ListParameters, "/calibrator/list_parameters").result.names
     own = [name for name in listed if name != "use_sim_time" and "start_type_description" not in name]
-    assert sorted(own) == ["autostart", "bags", "cell", "method", "output", "rollouts", "seed"]
+    assert sorted(own) == [
+        "autostart", "bags", "calibrate_at_start", "cell", "false_alarm", "method", "output", "resume", "rollouts",
+        "running_check", "seed", "versions",
+    ]  # fmt: skip
     request = DescribeParameters.Request(names=own)
     described = probe.call(DescribeParameters, "/calibrator/describe_parameters", request).descriptors
     assert all(one.description for one in described)
