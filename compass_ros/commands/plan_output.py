@@ -38,10 +38,12 @@ def print_plan(found: Planned, console: Console | None = None) -> None:
     if found.plan.undetectable:
         out.print(Text.assemble(("These shots cannot show: ", "bold"), ", ".join(found.plan.undetectable)))
     if better is not None:
-        gained = [b.at_five_sigma / a.at_five_sigma for a, b in zip(_shown(found.plan), _shown(better), strict=True)]
-        typical = float(np.exp(np.mean(np.log(gained))))
-        twins = [sum(len(v.twins) for v in _shown(p)) // 2 for p in (found.plan, better)]
-        said = f"The proposed shots see effects {1 / typical:.1f} times smaller; twins {twins[0]} -> {twins[1]}."
+        seen = [np.log([min(v.at_five_sigma / v.best.bound, 1.0) for v in _shown(p)]) for p in (found.plan, better)]
+        lost = [sum(not v.detectable for v in _shown(p)) for p in (found.plan, better)]
+        smaller = float(np.exp(np.mean(seen[0] - seen[1])))
+        said = (
+            f"The proposed shots see effects {smaller:.1f} times smaller; {lost[1]} instead of {lost[0]} stay unseen."
+        )
         out.print(Text(said, "bold"))
 
 
@@ -51,18 +53,20 @@ def _shown(plan: Plan) -> list[Visible]:
 
 
 def _effects(plan: Plan, better: Plan | None) -> Table:
-    caption = "absorbed: share that ordinary parameters would take; twins: cosine over " + f"{TWIN:g}"
+    caption = (
+        f"absorbed: what ordinary parameters would take; not told from: cosine over {TWIN:g}; never: beyond bounds"
+    )
     table = Table(caption=Text(caption, "dim"), caption_justify="left")
     proposed = ["proposed"] if better else []
-    for heading in ("effect", "amplitude", "seen at 5 sigma", *proposed, "unit", "absorbed", "not told from"):
-        table.add_column(heading, justify="right" if heading in ("seen at 5 sigma", "proposed", "absorbed") else "left")
+    for heading in ("effect: amplitude", "at 5 sigma", *proposed, "unit", "absorbed", "not told from"):
+        right = heading in ("at 5 sigma", "proposed", "absorbed")
+        table.add_column(heading, justify="right" if right else "left", overflow="fold")
     others = _shown(better) if better else []
     for i, v in enumerate(_shown(plan)):
-        names = _title(v)
-        twins = [t for t in v.twins if not t.startswith(f"{v.name} of")]
+        twins = [t for t in v.twins if " of " not in t or len(v.objects) == 1]
         for k, seen in enumerate(v.amplitudes):
             style = "" if v.detectable else "dim"
-            cells = [names if not k else "", seen.name, _number(seen)]
+            cells = [f"{_title(v)}: {seen.name}", _number(seen)]
             cells += [_number(others[i].amplitudes[k])] if better else []
             cells += [seen.unit, f"{seen.absorbed:.1%}", ", ".join(twins) if not k else ""]
             table.add_row(*(Text(c, style) for c in cells))
@@ -74,7 +78,7 @@ def _title(v: Visible) -> str:
 
 
 def _number(seen: Seen) -> str:
-    return f"{seen.at_five_sigma:.2g}" if seen.at_five_sigma <= seen.bound else "beyond bounds"
+    return f"{seen.at_five_sigma:.2g}" if seen.at_five_sigma <= seen.bound else "never"
 
 
 def _parameters(plan: Plan, better: Plan | None) -> Table:
@@ -83,8 +87,9 @@ def _parameters(plan: Plan, better: Plan | None) -> Table:
     hidden = len(plan.parameters) - len(felt)
     caption = Text(f"{hidden} further parameters stay as unknown as they are" if hidden else "", "dim")
     table = Table(caption=caption, caption_justify="left")
-    for heading in ("parameter", "seen at 5 sigma", *(["proposed"] if better else []), "known to", "unit", "absorbed"):
-        table.add_column(heading, justify="left" if heading in ("parameter", "unit") else "right")
+    proposed = ["proposed"] if better else []
+    for heading in ("parameter", "at 5 sigma", *proposed, "known to", "unit", "absorbed"):
+        table.add_column(heading, justify="left" if heading in ("parameter", "unit") else "right", overflow="fold")
     for i in felt:
         seen = plan.parameters[i]
         cells = [seen.name, f"{seen.at_five_sigma:.2g}"]

@@ -1,17 +1,20 @@
 """When no known effect explains what is left: a formula in position and velocity, proposed by sparse regression.
 
 The regression is in the space of the recordings, not of differentiated data: each term's acceleration along the
-calibrated paths is carried by the impulse responses into the residual, and the parameters take their part first. With
-S the information of the terms and g their pull, S = L L', the problem |L' w + L^-1 g|^2 is that of all frames; it is
-handed to sequentially thresholded least squares (SINDy: Brunton, Proctor and Kutz 2016; here pysindy).
+calibrated paths is carried by the impulse responses into the residual, and the parameters take their part first. What
+is left is a linear problem in the coefficients. Its best sets of terms (all up to EXHAUSTIVE, then grown one by one) are
+weighed against each other by the extended BIC (Chen and Chen 2008), which counts how many sets were tried. The idea
+of a library of terms is SINDy's (Brunton, Proctor and Kutz 2016). A term more than the full simulator and held-out
+episodes ask for is not taken.
 """
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
+from itertools import combinations
+from math import comb, log
 
 import numpy as np
 
@@ -24,11 +27,11 @@ from compass_ros.discovery.screen import Score, Space
 from compass_ros.simulation.effects import Attached, Effect, Quantity
 from compass_ros.simulation.effects.effect import Context
 from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.types import Floats
+from compass_ros.types import Floats, Ints
 
 NAME = "formula"
-THRESHOLDS = (3.0, 5.0, 8.0, 12.0, 20.0, 40.0)
-"""Sizes under which a coefficient is dropped [its own sigma], weighed against each other by the BIC."""
+EXHAUSTIVE = 3
+"""Number of terms up to which every set is tried."""
 MOST_TERMS = 6
 KEPT = 0.1
 """Share of the excess held-out error that a formula has to remove to be kept."""
@@ -141,8 +144,8 @@ def effect_of(terms: Sequence[Monomial]) -> Effect:
     )
 
 
-def regress(space: Space, objects: tuple[str, ...]) -> Formula | None:
-    """The sparse formula on some movers that explains the residual best; None where no term is needed."""
+def regress(space: Space, objects: tuple[str, ...]) -> tuple[Formula, ...]:
+    """The best formula on some movers with 1, 2, ... terms, up to what the residual asks for; none of noise."""
     terms = basis()
     candidate = Candidate(Attached(effect_of(terms), objects))
     units = np.diag([q.scale for q in candidate.attached.effect.quantities])
@@ -150,62 +153,74 @@ def regress(space: Space, objects: tuple[str, ...]) -> Formula | None:
     information, pull = space.reduced(weights)
     c = space.likelihood.correlation_time
     size = np.sqrt(np.maximum(np.diag(information), 1e-12))
-    information, pull = information / np.outer(size, size), pull / size
-    chosen = _sparse(information / c, pull / c, float(np.log(space.likelihood.measurements / c)))
-    if not len(chosen):
-        return None
-    solved = -np.linalg.solve(information[np.ix_(chosen, chosen)], pull[chosen]) / size[chosen]
-    gain = -0.5 * float(pull[chosen] @ (solved * size[chosen]))
-    kept = tuple(terms[i] for i in chosen)
-    attached = Attached(effect_of(kept), objects)
-    low, high = (np.array([getattr(q, side) for q in attached.effect.quantities]) for side in ("low", "high"))
-    numbers = np.clip(solved, low, high)
-    tangent = space.tangent_of_weights(weights[:, :, chosen]) @ numbers
-    return Formula(kept, numbers, gain, Score(Candidate(attached), numbers, gain, tangent))
+    scaled, pulled = information / np.outer(size, size) / c, pull / size / c
+    out = []
+    for chosen in _sparse(scaled, pulled, log(space.likelihood.measurements / c)):
+        solved = -np.linalg.solve(scaled[np.ix_(chosen, chosen)], pulled[chosen]) / size[chosen]
+        kept = tuple(terms[i] for i in chosen)
+        attached = Attached(effect_of(kept), objects)
+        low, high = (np.array([getattr(q, side) for q in attached.effect.quantities]) for side in ("low", "high"))
+        numbers = np.clip(solved, low, high)
+        gain = float(_gains(scaled, pulled, chosen[None])[0])
+        tangent = space.tangent_of_weights(weights[:, :, chosen]) @ numbers
+        out.append(Formula(kept, numbers, gain, Score(Candidate(attached), numbers, gain, tangent)))
+    return tuple(out)
 
 
-def _sparse(information: Floats, pull: Floats, price: float) -> Floats:
-    """Indices of the terms kept: thresholded least squares, at each threshold, the best by BIC; columns of size one."""
-    from pysindy import STLSQ  # takes seconds to import, and is seldom needed
+def _sparse(information: Floats, pull: Floats, price: float) -> list[Ints]:
+    """Terms of the best sets of 1, 2, ..., up to the best size; columns have size one.
 
-    root = np.linalg.cholesky(information + 1e-8 * np.trace(information) / len(pull) * np.eye(len(pull)))
-    target = -np.linalg.solve(root, pull)
-    best, chosen = 0.0, np.empty(0, int)
-    for threshold in THRESHOLDS:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # it warns when it drops everything, which is an answer
-            model = STLSQ(threshold=threshold, alpha=1e-6, max_iter=50).fit(root.T, target[:, None])
-        support = np.flatnonzero(np.ravel(model.coef_))
-        if not 0 < len(support) <= MOST_TERMS:
-            continue
-        gain = 0.5 * float(pull[support] @ np.linalg.solve(information[np.ix_(support, support)], pull[support]))
-        if gain - 0.5 * len(support) * price > best:
-            best, chosen = gain - 0.5 * len(support) * price, support
-    return np.asarray(chosen)
+    `price` is the log of the number of measurements.
+    """
+    count = len(pull)
+    best, kept = 0.0, 0
+    found: list[Ints] = []
+    for size in range(1, min(MOST_TERMS, count) + 1):
+        if size <= EXHAUSTIVE:
+            sets = np.array(list(combinations(range(count), size)))
+        else:
+            others = np.setdiff1d(np.arange(count), found[-1])
+            sets = np.column_stack([np.tile(found[-1], (len(others), 1)), others])
+        gains = _gains(information, pull, sets)
+        found.append(sets[int(np.argmax(gains))])
+        worth = float(gains.max()) - 0.5 * size * price - log(comb(count, size))
+        if worth > best:
+            best, kept = worth, size
+    return found[:kept]
+
+
+def _gains(information: Floats, pull: Floats, sets: Ints) -> Floats:
+    """(S,) fall of the cost with each of (S, k) sets of terms."""
+    inner = information[sets[:, :, None], sets[:, None, :]] + 1e-9 * np.eye(sets.shape[1])
+    return np.asarray(0.5 * np.sum(pull[sets] * np.linalg.solve(inner, pull[sets][:, :, None])[:, :, 0], axis=1))
 
 
 def propose(space: Space, held_out: Likelihood, iterations: int = 12) -> Proposal | None:
     """The formula, on all movers or on one, that predicts held-out episodes best; None where none of them gains.
 
-    `held_out`: other episodes of the space's simulator, with the same prior.
+    `held_out`: other episodes of the space's simulator, with the same prior. Terms are added while they gain there.
     """
     movers = space.pushes.movers
     sets = [movers] if len(movers) < 2 else [movers, *((m,) for m in movers)]
-    found = [formula for formula in (regress(space, objects) for objects in sets) if formula is not None]
-    if not found:
-        return None
-    formula = max(found, key=lambda f: f.gain - 5.0 * len(f.terms))
-    joint = fit_jointly(space, [formula.score], iterations)
-    fitted = joint.fit.point.values[-len(formula.terms) :]
-    formula = Formula(formula.terms, fitted, formula.gain, formula.score)
+    by_objects = [formulas for formulas in (regress(space, objects) for objects in sets) if formulas]
     before = _excess(held_out, space.fit.point.values)
-    after = _excess(_with(held_out, joint), joint.fit.point.values)
-    gain = 1 - after / before if before > 0 else 0.0
-    if gain < KEPT:
+    if not by_objects or before <= 0:
         return None
+    best, proposal = 0.0, None
+    for formula in max(by_objects, key=lambda formulas: formulas[-1].gain - 5.0 * len(formulas)):
+        joint = fit_jointly(space, [formula.score], iterations)
+        gain = 1 - _excess(_with(held_out, joint), joint.fit.point.values) / before
+        if gain < best + KEPT:
+            break
+        best, proposal = gain, _proposal(formula, joint, gain)
+    return proposal
+
+
+def _proposal(formula: Formula, joint: Joint, gain: float) -> Proposal:
+    fitted = replace(formula, coefficients=joint.fit.point.values[-len(formula.terms) :])
     objects = " and ".join(formula.score.candidate.attached.objects)
-    sentence = f"A formula is proposed for {objects}, not named: {formula.text} (SI; held-out excess -{gain:.0%})."
-    return Proposal(formula, joint, gain, sentence)
+    sentence = f"A formula is proposed for {objects}, not named: {fitted.text} (SI; held-out excess -{gain:.0%})."
+    return Proposal(fitted, joint, gain, sentence)
 
 
 def _with(held_out: Likelihood, joint: Joint) -> Likelihood:

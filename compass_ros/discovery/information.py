@@ -22,6 +22,8 @@ PLACES = (-0.5, 0.5)
 """Where a local field is tried beside its usual place, in parts of the way to the bounds."""
 LARGE = 0.3
 """Step of effects that act only beyond a limit, in parts of the way to the bound."""
+FELT = 1e-2
+"""Change of all recordings together that counts as something [sigma]."""
 _LEAST = 1e-9
 """Share of a tangent that is called left over at least: rounding hides less."""
 
@@ -130,9 +132,9 @@ def _cases(space: Space, candidate: Candidate) -> Iterator[tuple[list[Quantity],
 def _of_steps(space: Space, candidate: Candidate) -> Floats:
     """(D, q) change per unit from a small step; from a large one where a small one does nothing (a limit)."""
     small = differences(space, candidate)
-    if small.any():
-        return small
     effect = candidate.attached.effect
+    if np.linalg.norm(small * np.array([q.scale for q in effect.quantities])) > FELT:
+        return small
     large = tuple(replace(q, scale=LARGE * q.high) for q in effect.quantities)
     return differences(space, Candidate(replace(candidate.attached, effect=replace(effect, quantities=large))))
 

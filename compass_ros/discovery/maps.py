@@ -69,9 +69,11 @@ def residual_map(space: Space, residual: Floats | None = None) -> TableMap | Non
     push = accelerations(space, residual)
     squared = np.sum(push**2, axis=3).ravel()
     place = pushes.paths[..., :2].reshape(-1, 2)
-    edges = [np.arange(np.floor(v.min() / CELL_M), np.floor(v.max() / CELL_M) + 2) * CELL_M for v in place.T]
-    total, _, _ = np.histogram2d(place[:, 0], place[:, 1], bins=edges, weights=squared)
-    count, _, _ = np.histogram2d(place[:, 0], place[:, 1], bins=edges)
-    value = np.where(count > 0, np.sqrt(total / np.maximum(count, 1)), np.nan)
-    centres = [(edge[:-1] + edge[1:]) / 2 for edge in edges]
-    return TableMap(_LABEL, "m/s^2", centres[0], centres[1], value.T)
+    cell = np.floor(place / CELL_M).astype(int)
+    first, (columns, rows) = cell.min(axis=0), np.ptp(cell, axis=0) + 1
+    at = (cell[:, 1] - first[1]) * columns + cell[:, 0] - first[0]
+    count = np.bincount(at, minlength=rows * columns)
+    total = np.bincount(at, squared, minlength=rows * columns)
+    value = np.where(count > 0, np.sqrt(total / np.maximum(count, 1)), np.nan).reshape(rows, columns)
+    x, y = ((start + np.arange(n) + 0.5) * CELL_M for start, n in zip(first, (columns, rows), strict=True))
+    return TableMap(_LABEL, "m/s^2", x, y, value)

@@ -23,6 +23,7 @@ from compass_ros.simulation.effects import EFFECTS
 from compass_ros.types import Floats
 
 POOL = 32
+"""Shots that are tried."""
 DRAWS = 6
 TOLD = 5.0
 """Difference [sigma] at which two models are told apart."""
@@ -60,7 +61,9 @@ class NextExperiment:
     """Least difference of the models that the shot tells apart [sigma]; 0 without a shot."""
 
 
-def next_experiment(simulator: Simulator, likelihood: Likelihood, rivals: Sequence[Joint], seed: int) -> NextExperiment:
+def next_experiment(
+    simulator: Simulator, likelihood: Likelihood, rivals: Sequence[Joint], seed: int, pool: int = POOL
+) -> NextExperiment:
     """The shot that tells most pairs of two or more rival models apart, and by most; or what is no shot.
 
     `simulator` and `likelihood` are those without effects; the sigma is the recordings' own.
@@ -71,7 +74,7 @@ def next_experiment(simulator: Simulator, likelihood: Likelihood, rivals: Sequen
     if not simulator.cell.action or simulator.cell.spec.start:
         return NextExperiment(_sentence_other(rivals, pairs), None, 0.0)
     rng = np.random.default_rng(seed)
-    shots = draw(simulator, POOL, rng)
+    shots = draw(simulator, pool, rng)
     sigma = np.nanmedian(likelihood.sigma[:, : max(likelihood.sigma.shape[1] // 4, 1)], axis=(0, 1))
     predicted = [_predictions(rival, shots, sigma, simulator.cell.duration, rng) for rival in rivals]
     apart = np.array([_apart(predicted[a], predicted[b]) for a, b in pairs])  # (pairs, S)

@@ -83,7 +83,7 @@ def draw(simulator: Simulator, count: int, rng: np.random.Generator, box: Floats
     found: list[Floats] = []
     for _ in range(_TRIES):
         drawn = completed(cell, rng.uniform(low, high, (40 * count, len(low))))
-        drawn = drawn[within_stroke(simulator, drawn)][: 2 * count]
+        drawn = drawn[within_stroke(simulator, drawn)][: count + count // 2]
         if len(drawn):
             found.extend(drawn[worth(simulator, drawn, sigma)])
         if len(found) >= count:

@@ -1,0 +1,68 @@
+"""Recordings of the air-hockey table with planted physics, linearised at the defaults; few shots and parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from compass_ros.calibration.least_squares import Fit, Point, linearise, start
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.refine import ROBUST
+from compass_ros.discovery.impulses import impulses
+from compass_ros.discovery.joint import Joint, widened
+from compass_ros.discovery.planned import perfect
+from compass_ros.discovery.screen import Space
+from compass_ros.simulation.effects import Attached
+from compass_ros.types import Floats
+from test.simulation.table import cell, simulator
+
+CALM = np.array([[-0.206, -0.08, 0.163, 0.385], [-0.252, 0.051, 0.157, 0.376], [-0.193, 0.05, -0.154, 0.33]])
+"""Three shots that amplify little: what is planted moves the pucks as its tangent says."""
+HELD_OUT = np.array([[-0.198, 0.045, 0.208, 0.242], [-0.248, -0.053, 0.242, 0.775]])
+"""Two more."""
+PUCKS = ("puck1", "puck2")
+SIGMA = 1e-3
+RATE = 30.0
+FREE = (
+    "puck1@dyna@friction_sliding",
+    "puck2@dyna@friction_sliding",
+    "pusher@actuation@vel_discount",
+    "env@camera@bias_x",
+    "env@camera@bias_y",
+)
+
+
+def recorded(effect: Attached | None, numbers: Sequence[float], shots: Floats = CALM, seed: int = 0) -> Likelihood:
+    """Shots on a table with an effect, with noise."""
+    clean = perfect(simulator(), shots, RATE, SIGMA)
+    wider = simulator().with_effects([effect] if effect else [])
+    values = np.tile(np.concatenate([simulator().defaults, numbers]), (len(shots), 1))
+    measured = wider.observe(values, shots, clean.time_s)
+    return replace(clean, measured=measured + np.random.default_rng(seed).normal(0, SIGMA, measured.shape))
+
+
+def space_of(likelihood: Likelihood) -> Space:
+    """Tangents at the defaults, where the fit would have begun."""
+    free = np.array([cell().index(name) for name in FREE])
+    point = start(likelihood, simulator().defaults)
+    fit = Fit(point, linearise(likelihood, point, free, np.full(len(free), 0.02)), free, 1e3 * ROBUST, 0, True)
+    return Space(simulator(), likelihood, fit, impulses(simulator(), likelihood, fit))
+
+
+@cache
+def planned_space() -> Space:
+    """Three perfect shots."""
+    return space_of(perfect(simulator(), CALM, RATE, SIGMA))
+
+
+def joint(space: Space, effect: Attached, numbers: Sequence[float]) -> Joint:
+    """A fit that ended at the defaults with the given effect."""
+    wider, likelihood = widened(simulator(), space.likelihood, [effect])
+    known = len(simulator().defaults)
+    free = np.concatenate([space.fit.free, known + np.arange(len(numbers))])
+    point = Point(np.concatenate([simulator().defaults, numbers]), space.fit.point.launch, 0.0)
+    linear = linearise(likelihood, point, free, np.full(len(free), 0.02))
+    return Joint(wider, likelihood, Fit(point, linear, free, ROBUST, 0, True), (effect,))
