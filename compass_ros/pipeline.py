@@ -9,10 +9,12 @@ from importlib.metadata import version
 
 import numpy as np
 
+from compass_ros.calibration.causal_map import causal_map_refined
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.methods import compass_config, method
 from compass_ros.calibration.noise import Noise, measure_noise
 from compass_ros.calibration.problem import Allowance, Problem
+from compass_ros.calibration.refine import Refined, refine
 from compass_ros.cells import Cell
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery, discover, not_evaluated
@@ -48,10 +50,11 @@ def calibrate(
     noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m)
     problem = pose(simulator, data, noise)
 
-    estimate = estimate_parameters(problem, config, report)
-    found = not_evaluated("discovery was switched off")
+    estimate, refined = estimate_parameters(problem, config, report)
+    found = not_evaluated("it was switched off")
     if config.discover:
-        found = discover(simulator, problem, estimate, judge, noise, report)
+        refined = refined or refine(problem.likelihood, estimate.values)
+        found = discover(simulator, refined, pose(simulator, judge, noise).likelihood, noise, config.seed, report)
     return assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, found), found
 
 
@@ -81,7 +84,7 @@ def pose(simulator: Simulator, data: Recordings, noise: Noise) -> Problem:
         measured=data.measured,
         sigma=np.broadcast_to(noise.sigma, data.measured.shape).copy(),
         correlation_time=noise.correlation_time,
-        launch_std=np.array([cell.spec.launch_noise.get(a.name, 0.0) for a in cell.action]),
+        launch_std=cell.launch_std,
         prior_mean=simulator.defaults,
         prior_std=np.array([p.half_width for p in simulator.parameters]),
     )
@@ -99,8 +102,12 @@ def pose(simulator: Simulator, data: Recordings, noise: Noise) -> Problem:
     )
 
 
-def estimate_parameters(problem: Problem, config: CalibrationConfig, report: Report) -> Estimate:
-    """Run the configured method."""
+def estimate_parameters(
+    problem: Problem, config: CalibrationConfig, report: Report
+) -> tuple[Estimate, Refined | None]:
+    """Run the configured method; ours hands on the fit that it ends with."""
+    if config.method in ("default", "causal-map"):
+        return causal_map_refined(problem, report)
     compass = config.compass
     real = min(compass.n_cmd_action, len(problem.actions))
     allowance = Allowance(compass.n_round, real, compass.n_sim)
@@ -112,8 +119,8 @@ def estimate_parameters(problem: Problem, config: CalibrationConfig, report: Rep
 
         settings = compass_config(allowance, compass)
         p = problem
-        return run(p.differences, p.actions, p.parameters, p.factors, p.start, settings, config.seed, report)
-    return method(config.method).run(problem, allowance, config.seed, report)
+        return run(p.differences, p.actions, p.parameters, p.factors, p.start, settings, config.seed, report), None
+    return method(config.method).run(problem, allowance, config.seed, report), None
 
 
 def assemble(

@@ -22,7 +22,12 @@ IDENTIFIED = 0.5
 
 def causal_map(problem: Problem, allowance: Allowance, seed: int, report: Report) -> Estimate:
     """Estimate all parameters that the recordings feel; the others keep their start values."""
-    del allowance, seed  # deterministic; needs far fewer rollouts than the paper's budget
+    del allowance, seed  # deterministic, and stops by itself
+    return causal_map_refined(problem, report)[0]
+
+
+def causal_map_refined(problem: Problem, report: Report) -> tuple[Estimate, Refined]:
+    """The estimate together with the fit that it comes from, for the search for missing physics."""
     trace: list[Iteration] = []
     spent = 0
 
@@ -35,7 +40,7 @@ def causal_map(problem: Problem, allowance: Allowance, seed: int, report: Report
 
     watch("screen", 0.0, start(problem.likelihood, problem.start))
     refined = refine(problem.likelihood, problem.start, watch)
-    return to_estimate(problem, refined, tuple(trace))
+    return to_estimate(problem, refined, tuple(trace)), refined
 
 
 def to_estimate(problem: Problem, refined: Refined, trace: tuple[Iteration, ...]) -> Estimate:

@@ -13,6 +13,8 @@ import numpy as np
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.types import Bools, Floats, Ints
 
+FIRST_STEP = 0.02
+"""First finite differences, in standard deviations of the prior."""
 _TRIALS = np.array([0.01, 1.0, 100.0])
 """Damping factors tried at once, relative to the current one."""
 
@@ -73,7 +75,8 @@ def cost(likelihood: Likelihood, points: list[Point], robust: float) -> tuple[Fl
 
 
 def _rho(residual: Floats, robust: float) -> Floats:
-    return np.asarray(2 * robust**2 * (np.sqrt(1 + (residual / robust) ** 2) - 1))
+    squared = residual**2
+    return np.asarray(2 * squared / (np.sqrt(1 + squared / robust**2) + 1))  # stable for large scales
 
 
 def _prior(likelihood: Likelihood, point: Point) -> float:
@@ -126,7 +129,7 @@ def normal_equations(
     episodes, p, launches = len(likelihood.inputs), len(free), linear.launch_jacobian.shape[-1]
     n = p + episodes * launches
     hessian, gradient = np.eye(n), np.zeros(n)
-    j = linear.jacobian.reshape(episodes, -1, p)
+    j = linear.jacobian.reshape(episodes, linear.residual[0].size, p)
     jl = linear.launch_jacobian.reshape(episodes, j.shape[1], launches)
     w, r = weight.reshape(episodes, -1), linear.residual.reshape(episodes, -1)
     for e in range(episodes):
@@ -153,14 +156,16 @@ def minimise(
     tolerance: float = 1e-3,
     linear: Linear | None = None,
     fresh: bool = True,
+    steps: Floats | None = None,
 ) -> Fit:
     """Levenberg-Marquardt from a point until a step would lower the cost by less than `tolerance` (log likelihood).
 
     Differences are taken anew only where the model failed to predict what a step did; otherwise Broyden's update keeps it
     going, which costs no rollout. `linear`: differences that are known already near the point. `fresh`: end with
-    differences at the solution, as standard errors need them.
+    differences at the solution, as standard errors need them. `steps`: (p,) of the first differences, where known.
     """
-    damping, steps = 1e-3, np.ones(len(free))
+    damping = 1e-3
+    steps = np.full(len(free), FIRST_STEP) if steps is None else steps
     costs, residuals = cost(likelihood, [point], robust)
     point, exact = replace(point, cost=float(costs[0])), False
     if linear is not None:
@@ -169,8 +174,8 @@ def minimise(
     while iteration < iterations and not converged:
         iteration += 1
         if linear is None:
-            linear = linearise(likelihood, point, free, steps)
-            steps, exact = difference_steps(linear), True
+            linear, steps = _linearise_well(likelihood, point, free, steps)
+            exact = True
         hessian, gradient = normal_equations(likelihood, point, linear, free, robust)
         trials = [_step(likelihood, point, free, hessian, gradient, damping * factor) for factor in _TRIALS]
         costs, residuals = cost(likelihood, trials, robust)
@@ -191,8 +196,18 @@ def minimise(
         else:
             linear = None  # the updated differences were wrong: take them anew
     if fresh and not exact or linear is None:
-        linear = linearise(likelihood, point, free, steps)
+        linear, _ = _linearise_well(likelihood, point, free, steps)
     return Fit(point, linear, free, robust, iteration, converged)
+
+
+def _linearise_well(likelihood: Likelihood, point: Point, free: Ints, steps: Floats) -> tuple[Linear, Floats]:
+    """Differences, taken once more where the steps were far too long; and the steps for the next time."""
+    linear = linearise(likelihood, point, free, steps)
+    better = difference_steps(linear)
+    if np.any(better < 0.25 * steps):
+        linear = linearise(likelihood, point, free, np.minimum(steps, better))
+        better = difference_steps(linear)
+    return linear, better
 
 
 def _move(likelihood: Likelihood, old: Point, new: Point, free: Ints) -> Floats:

@@ -34,6 +34,9 @@ STRONG = 60.0
 ROBUST = 4.0
 """Scale of the loss [sigma]: Gaussian noise is hardly touched, a swapped or lost frame hardly counts."""
 
+CALM = 300.0
+"""Movement of a frame by one prior width [sigma] above which it is trusted less; ordinary shots stay below."""
+
 Watch = Callable[[str, float, Point], bool]
 """(stage, share of the refinement done, where it stands) -> whether to go on."""
 
@@ -56,15 +59,17 @@ class Refined:
 def refine(likelihood: Likelihood, values: Floats, watch: Watch = lambda *_: True) -> Refined:
     """Fit from the given (P,) values."""
     point = start(likelihood, values)
-    strong = np.flatnonzero(sensitivity(likelihood, point) > STRONG)
+    strength, steps = sensitivity(likelihood, point)
+    strong = np.flatnonzero(strength > STRONG)
     for i, share in enumerate(HORIZONS):
         part = likelihood.until(share * float(likelihood.time_s.max()))
         robust = max(ROBUST, 3.0 * typical_residual(part, point))
         last = share == HORIZONS[-1]
-        point = minimise(part, point, strong, 8 if last else 4, robust, tolerance=1.0 if last else 5.0).point
+        fit = minimise(part, point, strong, 8 if last else 4, robust, tolerance=1.0 if last else 5.0, steps=steps[strong], fresh=last)
+        point, steps[strong] = fit.point, difference_steps(fit.linear)
         if not watch("refine", 0.7 * (i + 1) / len(HORIZONS), point):
-            break
-    return polish(likelihood, point, watch)
+            return polish(likelihood, point, watch)
+    return polish(calmed(likelihood, fit.linear), point, watch)
 
 
 def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True) -> Refined:
@@ -72,16 +77,37 @@ def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True)
 
     What is felt is asked here and not at the start, from where a puck may never have reached some wall.
     """
-    strength = sensitivity(likelihood, point)
+    strength, steps = sensitivity(likelihood, point)
     felt = np.flatnonzero(strength > FELT)
-    fit = minimise(likelihood, point, felt, 12, max(ROBUST, 3.0 * typical_residual(likelihood, point)), tolerance=1.0)
+    robust = max(ROBUST, 3.0 * typical_residual(likelihood, point))
+    fit = minimise(likelihood, point, felt, 12, robust, tolerance=1.0, steps=steps[felt])
     watch("refine", 0.85, fit.point)
     rough = with_roughness(likelihood, fit)
-    fit = minimise(rough, fit.point, felt, 8, ROBUST, tolerance=0.3, linear=scaled(fit.linear, likelihood, rough))
+    linear = scaled(fit.linear, likelihood, rough)
+    fit = minimise(rough, fit.point, felt, 8, ROBUST, tolerance=0.3, linear=linear)
     watch("refine", 1.0, fit.point)
-    hessian, _ = normal_equations(rough, fit.point, fit.linear, felt, ROBUST)
-    covariance = np.linalg.inv(hessian) * rough.correlation_time
-    return Refined(fit, rough, covariance, chi_square(rough, fit), strength)
+    return Refined(fit, rough, covariance(rough, fit), chi_square(rough, fit), strength)
+
+
+def covariance(likelihood: Likelihood, fit: Fit) -> Floats:
+    """(n, n) of free parameters, then launches, in the prior's standard deviations.
+
+    The data's part of the Hessian is divided by the correlation time: neighbouring frames repeat each other.
+    """
+    hessian, _ = normal_equations(likelihood, fit.point, fit.linear, fit.free, fit.robust)
+    prior = np.eye(len(hessian))
+    return np.asarray(np.linalg.inv((hessian - prior) / likelihood.correlation_time + prior))
+
+
+def calmed(likelihood: Likelihood, linear: Linear) -> Likelihood:
+    """Trust frames less that the parameters move by more than CALM sigma per prior width.
+
+    After an unlucky collision everything is amplified: the fit's errors, numerics, and physics that nobody asked about.
+    Such frames say little about the parameters that other frames do not say better.
+    """
+    moved = np.sqrt(np.sum(linear.jacobian**2, axis=-1)).max(axis=-1)  # (E, F)
+    amplified = np.maximum.accumulate(moved, axis=1) / CALM
+    return replace(likelihood, sigma=likelihood.sigma * np.maximum(1.0, amplified)[:, :, None])
 
 
 def scaled(linear: Linear, old: Likelihood, new: Likelihood) -> Linear:
@@ -92,11 +118,11 @@ def scaled(linear: Linear, old: Likelihood, new: Likelihood) -> Linear:
     )
 
 
-def sensitivity(likelihood: Likelihood, point: Point) -> Floats:
-    """(P,) sigma by which one prior width of each parameter moves all recordings together."""
+def sensitivity(likelihood: Likelihood, point: Point) -> tuple[Floats, Floats]:
+    """(P,) sigma by which one prior width of each parameter moves all recordings together; (P,) steps for differences."""
     everything = np.arange(len(likelihood.parameters))
-    coarse = linearise(likelihood, point, everything, np.full(len(everything), 0.5))
-    return np.asarray(np.sqrt(np.sum(coarse.jacobian**2, axis=(0, 1, 2))))
+    coarse = linearise(likelihood, point, everything, np.full(len(everything), 0.3))
+    return np.sqrt(np.sum(coarse.jacobian**2, axis=(0, 1, 2))), difference_steps(coarse)
 
 
 def typical_residual(likelihood: Likelihood, point: Point) -> float:

@@ -1,12 +1,62 @@
-"""From a calibrated simulator to a verdict."""
+"""From a calibrated simulator to a verdict: screen, fit, choose, judge on episodes that were never fitted."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from compass_ros.calibration.least_squares import Point, minimise
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.noise import Noise
+from compass_ros.calibration.refine import Refined, covariance, polish
+from compass_ros.discovery.candidates import candidates
+from compass_ros.discovery.choose import ENOUGH, NEEDED, PAIR_ENOUGH, SMALL, Choice, choose, noise_cost
+from compass_ros.discovery.formula import Proposal, propose
+from compass_ros.discovery.impulses import impulses
+from compass_ros.discovery.joint import Joint
+from compass_ros.discovery.maps import TableMap, residual_map
+from compass_ros.discovery.next_shot import next_experiment
+from compass_ros.discovery.null import Null, simulate_null
+from compass_ros.discovery.plan import plan_of
+from compass_ros.discovery.information import information
+from compass_ros.discovery.screen import Score, Space
+from compass_ros.discovery.tangents import score
+from compass_ros.discovery.unknown import whereabouts
+from compass_ros.discovery.words import errors, place, value_of, where_of
 from compass_ros.simulation import Simulator
-from compass_ros.types import Floats, Mismatch
+from compass_ros.types import (
+    EffectFinding,
+    EffectParameter,
+    Evidence,
+    Floats,
+    Mismatch,
+    Progress,
+    Report,
+)
+
+LEAST_GAIN = 10.0
+"""Log likelihood that an effect must gain, whatever the null says."""
+SOMETHING = 0.06
+"""Excess of chi-square above the noise from which something is there although no candidate stands out."""
+EQUAL = 3.0
+"""Log evidence within which two effects are told apart by nothing."""
+EQUAL_SHARE = 0.015
+"""The same as a share of the gain: functional forms are never exactly right."""
+MIN_EPISODES = 3
+
+
+@dataclass(frozen=True)
+class Tried:
+    """One candidate for the report's ranking."""
+
+    name: str
+    channel: str
+    log_evidence: float
+    held_out_gain: float
+    kept: bool
+    note: str
 
 
 @dataclass(frozen=True)
@@ -23,6 +73,9 @@ class Discovery:
     """(P,) one standard deviation of the parameters."""
     effect_std: Floats | None = None
     """(P + Q,) one standard deviation of `values`."""
+    tried: tuple[Tried, ...] = ()
+    before: TableMap | None = None
+    after: TableMap | None = None
     warnings: Sequence[str] = ()
 
 
@@ -31,5 +84,246 @@ def not_evaluated(reason: str) -> Discovery:
     return Discovery(Mismatch("not_evaluated", None, (), (), "", f"Missing physics was not looked for: {reason}."))
 
 
-def discover(simulator, problem, estimate, judge, noise, report):
-    return not_evaluated("pending")
+def discover(
+    simulator: Simulator, refined: Refined, judge: Likelihood, noise: Noise, seed: int, report: Report
+) -> Discovery:
+    """Look for what the calibrated simulator lacks. `judge`: held-out episodes, same prior and noise."""
+    likelihood = refined.likelihood
+    if len(likelihood.inputs) < MIN_EPISODES:
+        return not_evaluated(f"{len(likelihood.inputs)} fitted episodes are too few, {MIN_EPISODES} are the least")
+
+    def tell(stage: str, done: float) -> bool:
+        return report(Progress(stage, 0, 0.7 + 0.3 * done, float("nan"), float("nan")))
+
+    tell("screen effects", 0.0)
+    asked = candidates(simulator)
+    space, scores = _screen(simulator, refined, asked)
+    null = simulate_null(space, scores, noise, seed)
+    undetectable = plan_of(information(space, asked)).undetectable
+    before = residual_map(space)
+    tell("screen effects", 0.3)
+    found = Finding(simulator, refined, judge, noise, null, undetectable, before, seed)
+    if not _something(space, scores, null, noise):
+        return found.none(scores)
+    tell("fit effects", 0.4)
+    choice = choose(space, scores, asked)
+    again = _restarted(refined, choice, simulator)
+    if again is not None:  # the plain simulator does better than it was thought to: begin again from there
+        space, scores = _screen(simulator, again, asked)
+        found = replace(found, refined=again, null=simulate_null(space, scores, noise, seed))
+        if not _something(space, scores, found.null, noise):
+            return found.none(scores)
+        choice = choose(space, scores, asked)
+    tell("weigh effects", 0.9)
+    return found.judged(space, choice)
+
+
+def _screen(simulator: Simulator, refined: Refined, asked: Sequence) -> tuple[Space, list[Score]]:  # type: ignore[type-arg]
+    space = Space(simulator, refined.likelihood, refined.fit, impulses(simulator, refined.likelihood, refined.fit))
+    scores = [score(space, candidate) for candidate in asked]
+    return space, sorted(scores, key=lambda s: -s.gain)
+
+
+def _something(space: Space, scores: Sequence[Score], null: Null, noise: Noise) -> bool:
+    """Whether a candidate or the sum of residuals stands out from the noise."""
+    gain = scores[0].gain / noise.correlation_time if scores else 0.0
+    floor = noise_cost(space.likelihood, space.fit)
+    excess = 2 * (space.fit.point.cost - floor) / space.likelihood.measurements
+    return gain > max(LEAST_GAIN, 1.2 * null.largest) or excess > SOMETHING * noise.correlation_time
+
+
+def _restarted(refined: Refined, choice: Choice, simulator: Simulator) -> Refined | None:
+    """The plain simulator fitted again from the best model's parameters, if that is a much better fit."""
+    if not choice.singles:
+        return None
+    best = choice.pair or choice.singles[0]
+    values = best.fit.point.values[: len(simulator.cell.parameters)]
+    start = Point(values, best.fit.point.launch, np.inf)
+    fit = minimise(refined.likelihood, start, refined.fit.free, 8, refined.fit.robust, 1.0, fresh=False)
+    if refined.fit.point.cost - fit.point.cost < max(0.15 * choice.excess, 5.0):
+        return None
+    return polish(refined.likelihood, fit.point)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What is known when the verdict is due."""
+
+    simulator: Simulator
+    refined: Refined
+    judge: Likelihood
+    noise: Noise
+    null: Null
+    undetectable: tuple[str, ...]
+    before: TableMap | None
+    seed: int
+
+    def none(self, scores: Sequence[Score]) -> Discovery:
+        """The noise explains everything."""
+        seen = self._held_out(self.simulator, self.refined.fit.point.values)
+        sentence = (
+            f"Nothing is missing that these recordings could show: held-out error {1e3 * seen:.2f} mm, "
+            f"noise {1e3 * self._floor():.2f} mm."
+        )
+        tried = tuple(
+            Tried(s.candidate.name, s.candidate.attached.effect.channel, s.gain, 0.0, False, "within the noise")
+            for s in scores[:8]
+        )
+        return Discovery(Mismatch("none", None, (), self.undetectable, "", sentence), tried=tried, before=self.before)
+
+    def judged(self, space: Space, choice: Choice) -> Discovery:
+        """Named, ambiguous, unknown or failed."""
+        best = choice.singles[0] if choice.singles else None
+        if best is not None and (choice.share(best) >= ENOUGH or choice.remainder(best) < SMALL) and self._helps(best):
+            return self.named(best, choice, (self._equals(best, choice),))
+        pair = choice.pair
+        if pair is not None and best is not None and self._helps(pair):
+            enough = choice.share(pair) >= PAIR_ENOUGH or choice.remainder(pair) < SMALL
+            needed = choice.share(pair) - choice.share(best) > NEEDED
+            if enough and needed:
+                return self.named(pair, choice, ((), ()))
+        return self.unknown(space, choice)
+
+    def named(self, joint: Joint, choice: Choice, equal: tuple[tuple[Joint, ...], ...]) -> Discovery:
+        """One or two effects with values, errors and evidence."""
+        std = self._std(joint)
+        movers = self.simulator.movers()
+        findings, at = [], len(self.simulator.cell.parameters)
+        for attached, equals in zip(joint.added, equal, strict=True):
+            size = len(attached.effect.quantities)
+            numbers, errors_of = joint.fit.point.values[at : at + size], std[at : at + size]
+            parameters = {
+                q.name: EffectParameter(float(v), float(e), q.unit)
+                for q, v, e in zip(attached.effect.quantities, numbers, errors_of, strict=True)
+            }
+            names = tuple(dict.fromkeys(a.effect.name for other in equals for a in other.added))
+            findings.append(EffectFinding(attached.effect.name, parameters, self._evidence(joint, choice), names))
+            at += size
+        at = len(self.simulator.cell.parameters)
+        first = joint.fit.point.values[at : at + len(joint.added[0].effect.quantities)]
+        where = where_of(joint.added[0], first, movers)
+        rivals = [joint, *equal[0]]
+        ambiguous = len(rivals) > 1
+        following = next_experiment(self.simulator, self._plain(), rivals, self.seed).sentence if ambiguous else ""
+        lacks = " and ".join(a.effect.sentence for a in joint.added)
+        if ambiguous:
+            lacks = "one of these: " + "; ".join(a.effect.sentence for j in rivals for a in j.added)
+        values = "; ".join(value_of(f) for f in findings)
+        sentence = f"{place(where)}, the simulator lacks {lacks}; {values}; {self._errors(joint)}."
+        verdict = "ambiguous" if ambiguous else "named"
+        mismatch = Mismatch(verdict, where, tuple(findings), self.undetectable, following, sentence)
+        return self._with(joint, mismatch, choice, std)
+
+    def unknown(self, space: Space, choice: Choice) -> Discovery:
+        """Something is there that no known effect explains; a formula is proposed where one predicts."""
+        where, sure = whereabouts(space, choice)
+        if not sure and not choice.singles:
+            sentence = "The fit did not reach the noise floor and no place stands out: no verdict."
+            return Discovery(Mismatch("fit_failed", where, (), self.undetectable, "", sentence), before=self.before)
+        proposal: Proposal | None = propose(space, self.judge)
+        sentence = f"{place(where)}, something differs that no known effect explains"
+        if choice.singles:
+            best = choice.singles[0]
+            sentence += f" (the best, {best.name}, explains {100 * choice.share(best):.0f} % of it)"
+        sentence += f"; {proposal.sentence}" if proposal else "."
+        mismatch = Mismatch("unknown", where, (), self.undetectable, "", sentence)
+        if proposal is None:
+            return Discovery(mismatch, tried=self._tried(choice, None), before=self.before)
+        return self._with(proposal.joint, mismatch, choice, self._std(proposal.joint))
+
+    def _with(self, joint: Joint, mismatch: Mismatch, choice: Choice, std: Floats) -> Discovery:
+        cell = len(self.simulator.cell.parameters)
+        base = self.refined.fit
+        pushes = impulses(self.simulator, self.refined.likelihood, base)
+        after = residual_map(Space(self.simulator, self.refined.likelihood, base, pushes), joint.fit.linear.residual)
+        return Discovery(
+            mismatch,
+            joint.simulator,
+            joint.fit.point.values,
+            joint.fit.point.values[:cell],
+            std[:cell],
+            std,
+            self._tried(choice, joint),
+            self.before,
+            after,
+        )
+
+    def _equals(self, best: Joint, choice: Choice) -> tuple[Joint, ...]:
+        """Other effects that explain the recordings as well: within EQUAL of log evidence, or of the gain's share."""
+        kappa = self.noise.correlation_time
+        top = best.log_evidence(kappa)
+        margin = max(EQUAL, EQUAL_SHARE * choice.excess / kappa)
+        seen, out = {best.name}, []
+        for joint in choice.singles[1:]:
+            if joint.name not in seen and top - joint.log_evidence(kappa) < margin and self._helps(joint):
+                out.append(joint)
+            seen.add(joint.name)
+        return tuple(out)
+
+    def _helps(self, joint: Joint) -> bool:
+        """Whether held-out episodes, weighted by how far they can be trusted, are predicted better."""
+        return self._loss(joint.simulator, joint.fit.point.values) < self._loss(
+            self.simulator, self.refined.fit.point.values
+        )
+
+    def _loss(self, simulator: Simulator, values: Floats) -> float:
+        residual = self._residual(simulator, values)
+        return float(np.nanmedian(np.nanmean(np.minimum(residual**2, 400.0), axis=(1, 2))))
+
+    def _residual(self, simulator: Simulator, values: Floats) -> Floats:
+        tiled = np.tile(values, (len(self.judge.inputs), 1))
+        predicted = simulator.observe(tiled, self.judge.inputs, self.judge.time_s)
+        return np.asarray((predicted - self.judge.measured) / self.noise.sigma)
+
+    def _held_out(self, simulator: Simulator, values: Floats) -> float:
+        """rms distance on held-out episodes [m]."""
+        residual = self._residual(simulator, values) * self.noise.sigma
+        objects = max(len(self.simulator.cell.objects), 1)
+        return float(np.sqrt(np.nanmean(residual**2) * residual.shape[2] / objects))
+
+    def _floor(self) -> float:
+        objects = max(len(self.simulator.cell.objects), 1)
+        return float(np.sqrt(np.sum(self.noise.sigma**2) / objects))
+
+    def _errors(self, joint: Joint) -> str:
+        before = self._held_out(self.simulator, self.refined.fit.point.values)
+        return errors(before, self._held_out(joint.simulator, joint.fit.point.values), self._floor())
+
+    def _gain(self, joint: Joint) -> float:
+        before = self._held_out(self.simulator, self.refined.fit.point.values)
+        after, floor = self._held_out(joint.simulator, joint.fit.point.values), self._floor()
+        return float(np.clip((before - after) / max(before - floor, 1e-9), -1.0, 1.0))
+
+    def _evidence(self, joint: Joint, choice: Choice) -> Evidence:
+        kappa = self.noise.correlation_time
+        gained = choice.floor + choice.excess - joint.fit.point.cost
+        hessians = joint.log_evidence(kappa) + joint.fit.point.cost / kappa
+        plain = Joint(self.simulator, self.refined.likelihood, self.refined.fit, ())
+        without = plain.log_evidence(kappa) + self.refined.fit.point.cost / kappa
+        return Evidence(self._gain(joint), gained / kappa + hessians - without, self.null.false_alarm_p(gained / kappa))
+
+    def _std(self, joint: Joint) -> Floats:
+        """(P + Q,) standard deviations; the prior's where the recordings say nothing."""
+        std = joint.likelihood.prior_std.copy()
+        free = joint.fit.free
+        std[free] *= np.sqrt(np.diag(covariance(joint.likelihood, joint.fit))[: len(free)])
+        return std
+
+    def _plain(self) -> Likelihood:
+        return self.refined.likelihood
+
+    def _tried(self, choice: Choice, chosen: Joint | None) -> tuple[Tried, ...]:
+        kept = {a.effect.name for a in chosen.added} if chosen else set()
+        return tuple(
+            Tried(
+                joint.name,
+                joint.added[0].effect.channel,
+                self._evidence(joint, choice).log_evidence,
+                self._gain(joint),
+                joint.name in kept,
+                f"explains {100 * choice.share(joint):.0f} % of the excess",
+            )
+            for joint in choice.singles
+        )
+
+

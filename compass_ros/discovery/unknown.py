@@ -1,0 +1,91 @@
+"""Where something acts that has no name: flexible pushes, warps and launches, each weighed by its evidence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from compass_ros.discovery.choose import Choice
+from compass_ros.discovery.screen import Space
+from compass_ros.types import Floats, Region, Where
+
+_SIZES = (1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
+"""Prior sizes of a flexible push that are tried [m/s^2]."""
+_LENGTH = 0.12
+"""Distance over which a flexible push is alike [m]."""
+_HALF = 0.6
+"""Share of the pushes' strength that a region must hold to be told as the place."""
+
+
+def whereabouts(space: Space, choice: Choice) -> tuple[Where, bool]:
+    """Object, phase and channel of what is left, and whether it stands out at all.
+
+    Pushes that depend smoothly on place and time, on all movers or on one, are weighed against the best fits of known
+    effects of the other channels: what explains more says where it is.
+    """
+    movers = space.pushes.movers
+    sets = [movers] if len(movers) < 2 else [movers, *((m,) for m in movers)]
+    gains = {objects: _flexible(space, objects) for objects in sets}
+    best = max(gains, key=lambda objects: gains[objects] * (1.02 if len(objects) == 1 else 1.0))
+    others = {j.added[0].effect.channel: j for j in reversed(choice.singles) if j.added[0].effect.channel != "dynamics"}
+    rival = min(others.values(), key=lambda j: j.fit.point.cost, default=None)
+    explained = choice.floor + choice.excess - rival.fit.point.cost if rival else 0.0
+    if rival is not None and explained > 1.2 * gains[best]:
+        channel = rival.added[0].effect.channel
+        phase = {"actuation": "strike", "contact": "object_contact", "sensing": "all"}[channel]
+        return Where("all", phase, channel), True  # type: ignore[arg-type]
+    name = best[0] if len(best) == 1 and len(movers) > 1 else "all"
+    return Where(name, "free", "dynamics", _region(space, best)), gains[best] > 10.0
+
+
+def _kernel(space: Space, objects: tuple[str, ...]) -> Floats:
+    """(E K N, E K N) covariance of a push at all moments of all episodes: smooth in place, so that episodes share it."""
+    pushes = space.pushes
+    place = pushes.paths[..., :2].reshape(-1, 2)
+    time = np.broadcast_to(pushes.moments[None, :, None], pushes.paths.shape[:3]).ravel()
+    acts = np.array([m in objects for m in pushes.movers])
+    on = np.broadcast_to(acts, pushes.paths.shape[:3]).ravel().astype(float)
+    apart = np.sum((place[:, None] - place[None]) ** 2, axis=2) / _LENGTH**2
+    field = np.exp(-0.5 * apart)
+    pulse = np.exp(-0.5 * ((time[:, None] - time[None]) / 0.15) ** 2)
+    return np.asarray((field + pulse) * on[:, None] * on[None])
+
+
+def _pushes(space: Space, objects: tuple[str, ...], size: float) -> tuple[float, Floats]:
+    """Gain of a flexible push of a prior size, and its (E, K, N, 2) mean."""
+    shape = space.pushes.paths.shape[:3]
+    kernel = size**2 * _kernel(space, objects) + 1e-12 * np.eye(int(np.prod(shape)))
+    root = np.linalg.cholesky(kernel + 1e-9 * size**2 * np.eye(len(kernel)))
+    keep = min(120, len(root))
+    vectors, values, _ = np.linalg.svd(root, full_matrices=False)
+    basis = (vectors[:, :keep] * values[:keep]).reshape(*shape, keep)
+    both = np.zeros((*shape, 2, 2 * keep))
+    both[..., 0, :keep] = basis
+    both[..., 1, keep:] = basis
+    weights = both.reshape(shape[0], -1, 2 * keep)
+    matrix, pull = space.reduced(weights)
+    kappa = space.likelihood.correlation_time
+    inner = matrix / kappa + np.eye(len(pull))
+    mean = -np.linalg.solve(inner, pull / kappa)
+    gain = -0.5 * float(pull @ mean) - 0.5 * kappa * float(np.linalg.slogdet(inner)[1])
+    return gain, np.asarray((weights @ mean).reshape(*shape, 2))
+
+
+def _flexible(space: Space, objects: tuple[str, ...]) -> float:
+    return max(_pushes(space, objects, size)[0] for size in _SIZES)
+
+
+def _region(space: Space, objects: tuple[str, ...]) -> Region | None:
+    """A disc that holds most of the push's strength, where it is clearly smaller than the table."""
+    size = max(_SIZES, key=lambda s: _pushes(space, objects, s)[0])
+    push = _pushes(space, objects, size)[1]
+    strength = np.sum(push**2, axis=3).ravel()
+    place = space.pushes.paths[..., :2].reshape(-1, 2)
+    if strength.sum() <= 0:
+        return None
+    centre = (strength[:, None] * place).sum(axis=0) / strength.sum()
+    far = np.hypot(*(place - centre).T)
+    order = np.argsort(far)
+    inside = np.searchsorted(np.cumsum(strength[order]), 0.9 * strength.sum())
+    radius = float(far[order][min(inside, len(far) - 1)])
+    share = float(np.mean(far <= radius))
+    return Region((float(centre[0]), float(centre[1])), radius) if share < _HALF else None

@@ -1,0 +1,62 @@
+"""The verdict as a sentence, and where an effect acts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from compass_ros.simulation.effects import Attached
+from compass_ros.types import Channel, EffectFinding, Floats, Phase, Region, Where
+
+PHASE: dict[str, Phase] = {
+    "rate_dependent_restitution": "all",
+    "tangential_impulse": "all",
+    "local_wall": "wall_contact",
+    "off_centre_mass": "all",
+    "friction_cone": "all",
+}
+"""Phase of effects in contacts; the others follow from their channel."""
+OF_CHANNEL: dict[Channel, Phase] = {"dynamics": "free", "contact": "all", "actuation": "strike", "sensing": "all"}
+IN_WORDS: dict[Phase, str] = {
+    "strike": "In the strike",
+    "free": "On free slides",
+    "wall_contact": "In contacts with walls",
+    "object_contact": "In contacts between objects",
+    "all": "Throughout",
+}
+
+
+def where_of(attached: Attached, numbers: Floats, movers: Sequence[str]) -> Where:
+    """Object, phase, channel and region of a fitted effect."""
+    effect = attached.effect
+    phase = PHASE.get(effect.name, OF_CHANNEL[effect.channel])
+    objects = attached.objects
+    one = objects[0] if len(objects) == 1 and (len(movers) > 1 or effect.on == "walls") else "all"
+    names = [q.name for q in effect.quantities]
+    region = None
+    if "centre_x" in names:
+        centre = (float(numbers[names.index("centre_x")]), float(numbers[names.index("centre_y")]))
+        size = names.index("radius" if "radius" in names else "core")
+        region = Region(centre, float(numbers[size]))
+    return Where(one, phase, effect.channel, region)
+
+
+def place(where: Where) -> str:
+    """The place in words: 'On free slides of puck1, within 12 cm of (0.02, -0.01)'."""
+    words = IN_WORDS[where.phase]
+    if where.object != "all":
+        words += f" of {where.object}"
+    if where.region:
+        x, y = where.region.centre_m
+        words += f", within {100 * where.region.radius_m:.0f} cm of ({x:.2f}, {y:.2f})"
+    return words
+
+
+def value_of(finding: EffectFinding) -> str:
+    """The effect and its first number: 'fan_field, strength 0.21 +- 0.01 m/s^2'."""
+    name, first = next(iter(finding.parameters.items()))
+    return f"{finding.name}, {name} {first.value:.3g} +- {first.std:.1g} {first.unit}".replace(" 1", "", 0).rstrip()
+
+
+def errors(before: float, after: float, floor: float) -> str:
+    """Held-out errors in millimetres."""
+    return f"held-out error {1e3 * before:.2f} -> {1e3 * after:.2f} mm, floor {1e3 * floor:.2f} mm"
