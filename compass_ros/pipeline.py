@@ -102,9 +102,7 @@ def pose(simulator: Simulator, data: Recordings, noise: Noise) -> Problem:
     )
 
 
-def estimate_parameters(
-    problem: Problem, config: CalibrationConfig, report: Report
-) -> tuple[Estimate, Refined | None]:
+def estimate_parameters(problem: Problem, config: CalibrationConfig, report: Report) -> tuple[Estimate, Refined | None]:
     """Run the configured method; ours hands on the fit that it ends with."""
     if config.method in ("default", "causal-map"):
         return causal_map_refined(problem, report)

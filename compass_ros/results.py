@@ -10,8 +10,9 @@ import numpy as np
 
 from compass_ros.cells import Cell
 from compass_ros.discovery import Discovery
+from compass_ros.discovery.maps import TableMap
 from compass_ros.errors import ConfigError
-from compass_ros.reporting import ReportExtras, Scene, Shape, write_report, write_result
+from compass_ros.reporting import Candidate, ReportExtras, ResidualMap, Scene, Shape, write_report, write_result
 from compass_ros.reporting.kept import RESULT, TRAJECTORIES, write_trajectories
 from compass_ros.simulation.export import write_effects_of, write_scene
 from compass_ros.types import Result
@@ -27,10 +28,23 @@ def write_all(
     values = np.array([row.value for row in result.parameters])
     write_scene(cell, values, out / SCENE)
     write_effects_of(found.simulator, found.values, found.effect_std, cell, values, out / EFFECTS)
-    extras = ReportExtras(command, scene_of(cell), truth=dict(truth or {}))
+    extras = ReportExtras(
+        command,
+        scene_of(cell),
+        tuple(Candidate(t.name, t.channel, t.log_evidence, t.held_out_gain, t.kept, t.note) for t in found.tried),
+        _map(found.before),
+        _map(found.after),
+        dict(truth or {}),
+    )
     write_report(result, out / REPORT, extras)
     write_trajectories(result, out / TRAJECTORIES, extras)
     write_result(result, out / RESULT)
+
+
+def _map(of_table: TableMap | None) -> ResidualMap | None:
+    if of_table is None:
+        return None
+    return ResidualMap(of_table.label, of_table.unit, of_table.x_m, of_table.y_m, of_table.value)
 
 
 def make_writable(out: Path) -> None:

@@ -1,8 +1,8 @@
 """The default method, `causal-map`: which parameters matter is asked of the simulator, then their values are refined.
 
 The graph is the paper's, parameters to factors, but found by intervention: in a simulator every parameter can be moved
-alone. psi is the share of the difference that is explained by more than noise, e^2 / (e^2 + noise^2), with e the change of
-the factor's trajectory per prior width. The values are the maximum a posteriori of refine.py, with standard errors.
+alone. psi is the share of the difference that is more than noise, e^2 / (e^2 + noise^2), with e the change of the
+factor's trajectory per prior width. The values are the maximum a posteriori of refine.py, with standard errors.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from compass_ros.calibration.refine import Refined, refine, standard_errors
 from compass_ros.types import Estimate, Floats, Graph, Iteration, Progress, Report
 
 EDGE_SIGMA = 3.0
-"""An edge needs a change of the factor's trajectory, rms over frames, of this many sigma of one frame per prior width."""
+"""An edge needs a change of the factor's trajectory, rms over frames, of this many sigma per prior width."""
 IDENTIFIED = 0.5
 """A parameter is identified where the recordings shrink its prior width at least to this share."""
 

@@ -112,7 +112,7 @@ def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats) -
 
 
 def difference_steps(linear: Linear) -> Floats:
-    """(p,) steps that move the residual by about one sigma: well above the simulator's roughness, below its curvature.
+    """(p,) steps that move the residual by about one sigma: above the simulator's roughness, below its curvature.
 
     Judged by the upper quartile over episodes, since one episode with an unlucky collision would make all steps tiny.
     """
@@ -195,7 +195,7 @@ def minimise(
             converged = damping > 1e6
         else:
             linear = None  # the updated differences were wrong: take them anew
-    if fresh and not exact or linear is None:
+    if (fresh and not exact) or linear is None:
         linear, _ = _linearise_well(likelihood, point, free, steps)
     return Fit(point, linear, free, robust, iteration, converged)
 

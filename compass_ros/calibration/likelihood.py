@@ -14,7 +14,7 @@ import numpy as np
 from compass_ros.types import Floats, Ints, Parameter
 
 Predict = Callable[[Floats, Floats, Floats], Floats]
-"""(B, P) values, (B, A) inputs, (B, F) times [s] -> (B, F, C) what the tracker would say. The only door to a simulator."""
+"""(B, P) values, (B, A) inputs, (B, F) times [s] -> (B, F, C) what the tracker would say: the door to a simulator."""
 
 
 @dataclass(frozen=True)

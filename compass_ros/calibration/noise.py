@@ -75,7 +75,7 @@ def _small_sample(still: Floats) -> float:
 def _flight_sigma(measured: Floats) -> Floats:
     """(C,) robust deviation of the middle of seven frames from the parabola through the others.
 
-    Frames with contacts are a minority and fall to the median. White noise only: what is correlated follows the parabola.
+    Frames with contacts are a minority and fall to the median. White noise only: correlated noise follows the parabola.
     """
     half = _WINDOW // 2
     offsets = np.arange(-half, half + 1, dtype=float)

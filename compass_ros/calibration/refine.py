@@ -1,7 +1,7 @@
 """Exact values of the parameters that matter: the simulator in the loop, on a horizon that grows.
 
-A whole trajectory through several collisions has many minima; its first tenth has one. So the fit starts with the first
-tenth of each episode and follows the solution as more is added. It starts with the parameters that move the trajectories
+A whole trajectory through several collisions has many minima; its beginning has one. So the fit starts with the
+beginning of each episode and follows the solution as more is added. It starts with the parameters that move the trajectories
 most, and frees the others, down to those that the recordings can just feel, when the whole episode fits.
 """
 
@@ -65,7 +65,16 @@ def refine(likelihood: Likelihood, values: Floats, watch: Watch = lambda *_: Tru
         part = likelihood.until(share * float(likelihood.time_s.max()))
         robust = max(ROBUST, 3.0 * typical_residual(part, point))
         last = share == HORIZONS[-1]
-        fit = minimise(part, point, strong, 8 if last else 4, robust, tolerance=1.0 if last else 5.0, steps=steps[strong], fresh=last)
+        fit = minimise(
+            part,
+            point,
+            strong,
+            8 if last else 4,
+            robust,
+            tolerance=1.0 if last else 5.0,
+            steps=steps[strong],
+            fresh=last,
+        )
         point, steps[strong] = fit.point, difference_steps(fit.linear)
         if not watch("refine", 0.7 * (i + 1) / len(HORIZONS), point):
             return polish(likelihood, point, watch)
@@ -119,7 +128,7 @@ def scaled(linear: Linear, old: Likelihood, new: Likelihood) -> Linear:
 
 
 def sensitivity(likelihood: Likelihood, point: Point) -> tuple[Floats, Floats]:
-    """(P,) sigma by which one prior width of each parameter moves all recordings together; (P,) steps for differences."""
+    """(P,) sigma by which one prior width of each parameter moves all recordings; (P,) steps for differences."""
     everything = np.arange(len(likelihood.parameters))
     coarse = linearise(likelihood, point, everything, np.full(len(everything), 0.3))
     return np.sqrt(np.sum(coarse.jacobian**2, axis=(0, 1, 2))), difference_steps(coarse)

@@ -32,7 +32,7 @@ class Candidate:
 def candidates(simulator: Simulator) -> tuple[Candidate, ...]:
     """All effects that can act in this cell: on all its movers together, on each alone, on each wall."""
     movers = simulator.movers()
-    out = []
+    out: list[Candidate] = []
     for name, effect in EFFECTS.items():
         if name in NOT_FITTED or (effect.channel == "actuation" and not simulator.actuated):
             continue

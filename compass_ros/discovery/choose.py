@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, cost
+from compass_ros.calibration.least_squares import Fit, Point, cost, difference_steps, linearise, minimise
 from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.refine import ROBUST, calmed
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.impulses import impulses
 from compass_ros.discovery.joint import Joint, converge, fit_jointly
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import score
+from compass_ros.types import Floats
 
 ENOUGH = 0.93
 """Share of the excess (cost above the noise floor) that a single effect must explain to be named alone."""
@@ -24,9 +26,34 @@ SMALL = 0.12
 NEEDED = 0.04
 """Share of the excess that each effect of a pair must be worth."""
 TRIED = 6
-"""Names that are fitted, the most promising first."""
-PROMISING = 0.2
+"""Names that are fitted at once, the most promising first; as many again where none of them is enough."""
+PROMISING = 0.1
 """Least first-order gain, as a share of the best, to be tried."""
+HELD_OUT_SHARE = 0.4
+"""Share of the held-out excess that a model must remove where there is one."""
+HELD_OUT_SEEN = 15.0
+"""Held-out excess [log likelihood] from which it can be judged at all."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Episodes that were never fitted, weighted as the fitted ones are."""
+
+    likelihood: Likelihood
+    before: float
+    """Cost of the model without effects."""
+    floor: float
+    """Cost that noise leaves."""
+
+    def cost(self, joint: Joint) -> float:
+        """Cost of a fitted model."""
+        predicted = replace(self.likelihood, predict=joint.simulator.observe)
+        return held_out_cost(predicted, joint.fit.point.values)
+
+    def helps(self, joint: Joint) -> bool:
+        """Whether a model predicts these episodes better: clearly, where there is something to gain."""
+        excess, gain = self.before - self.floor, self.before - self.cost(joint)
+        return gain > HELD_OUT_SHARE * excess if excess > HELD_OUT_SEEN else gain > -5.0
 
 
 @dataclass(frozen=True)
@@ -48,35 +75,81 @@ class Choice:
         """Excess of chi-square that a model leaves."""
         return 2 * max(joint.fit.point.cost - self.floor, 0.0) / joint.likelihood.measurements
 
+    def enough(self, joint: Joint) -> bool:
+        """Whether a model explains what there is to explain."""
+        return self.share(joint) >= (ENOUGH if len(joint.added) == 1 else PAIR_ENOUGH) or self.remainder(joint) < SMALL
+
+
+def held_out(judge: Likelihood, space: Space) -> HeldOut:
+    """Weigh held-out episodes: frames that the parameters move too much are trusted less, as in the fit."""
+    point = Point(space.fit.point.values, np.zeros_like(judge.inputs), np.inf)
+    free = space.fit.free
+    linear = linearise(judge, point, free, difference_steps(space.fit.linear))
+    calm = calmed(judge, linear)
+    floor = noise_cost(calm, replace(space.fit, free=np.zeros(0, dtype=np.int64)))
+    return HeldOut(calm, held_out_cost(calm, point.values), floor)
+
+
+def held_out_cost(likelihood: Likelihood, values: Floats) -> float:
+    """Robust cost without the prior's part."""
+    tiled = np.tile(values, (len(likelihood.inputs), 1))
+    residual = likelihood.residual(tiled, likelihood.inputs, np.arange(len(tiled)))
+    return float(np.sum(residual**2 / (np.sqrt(1 + (residual / ROBUST) ** 2) + 1)))
+
 
 def noise_cost(likelihood: Likelihood, fit: Fit) -> float:
     """Cost that unit normal noise leaves under the robust loss, less what the free parameters take."""
     grid = np.linspace(-6, 6, 2001)
     density = np.exp(-0.5 * grid**2) / np.sqrt(2 * np.pi)
     loss = fit.robust**2 * (np.sqrt(1 + (grid / fit.robust) ** 2) - 1)
-    quiet = np.nanmedian(likelihood.sigma) ** 2 / likelihood.sigma**2  # frames that roughness makes uncertain are quieter
+    quiet = (
+        np.nanmedian(likelihood.sigma) ** 2 / likelihood.sigma**2
+    )  # frames that roughness makes uncertain are quieter
     of_noise = float(np.sum(density * loss) * (grid[1] - grid[0]))
     measured = ~np.isnan(likelihood.measured)
     return of_noise * float(np.sum(np.broadcast_to(quiet, measured.shape)[measured])) - 0.5 * len(fit.free)
 
 
-def choose(space: Space, scores: Sequence[Score], candidates: Sequence[Candidate]) -> Choice:
-    """Fit the promising candidates one by one; where none is enough, the best of them with a second one."""
+def choose(space: Space, scores: Sequence[Score], candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
+    """Fit the promising candidates; where none is enough, others, and then the best of them with a second one."""
     base = float(cost(space.likelihood, [space.fit.point], space.fit.robust)[0][0])
     floor = min(noise_cost(space.likelihood, space.fit), base)
-    singles = [fit_jointly(space, [s], 6) for s in _promising(scores)]
-    singles.sort(key=lambda j: j.fit.point.cost)
-    floor = min([floor, *(j.fit.point.cost for j in singles)])
-    choice = Choice(tuple(singles), None, base - floor, floor)
+    singles: list[Joint] = []
+    for promising in _rounds(scores):
+        tried = [fit_jointly(space, [s], 4, tolerance=2.0) for s in promising]
+        tried.sort(key=lambda j: j.fit.point.cost)
+        tried = [further(j) if j.fit.point.cost < 0.5 * (base + tried[0].fit.point.cost) else j for j in tried]
+        singles = sorted([*singles, *tried], key=lambda j: j.fit.point.cost + unseen.cost(j))
+        if not singles:
+            break
+        singles[0] = converge(singles[0])
+        floor = min(floor, singles[0].fit.point.cost)
+        choice = Choice(tuple(singles), None, base - floor, floor)
+        if choice.enough(singles[0]) and unseen.helps(singles[0]):
+            return choice
     if not singles:
-        return choice
-    best = converge(singles[0])
-    singles[0] = best
-    choice = Choice(tuple(singles), None, base - min(floor, best.fit.point.cost), min(floor, best.fit.point.cost))
-    if choice.share(best) >= ENOUGH or choice.remainder(best) < SMALL:
-        return choice
-    pair = _second(space, best, singles, candidates)
-    return Choice(choice.singles, pair, choice.excess, min(choice.floor, pair.fit.point.cost if pair else np.inf))
+        return Choice((), None, base - floor, floor)
+    pair = _second(space, singles[0], singles, candidates, unseen)
+    floor = min(floor, pair.fit.point.cost) if pair else floor
+    return Choice(tuple(singles), pair, base - floor, floor)
+
+
+def further(joint: Joint) -> Joint:
+    """A promising fit, continued."""
+    fit = minimise(
+        joint.likelihood, joint.fit.point, joint.fit.free, 5, joint.fit.robust, 1.0, joint.fit.linear, fresh=False
+    )
+    return replace(joint, fit=fit)
+
+
+def _rounds(scores: Sequence[Score]) -> Iterator[list[Score]]:
+    """Candidates to try, most promising first, in two rounds."""
+    ordered = _promising(scores)
+    names = list(dict.fromkeys(s.candidate.name for s in ordered))
+    for first in (0, TRIED):
+        chosen = names[first : first + TRIED]
+        if chosen:
+            yield [s for s in ordered if s.candidate.name in chosen]
 
 
 def _promising(scores: Sequence[Score]) -> list[Score]:
@@ -85,7 +158,7 @@ def _promising(scores: Sequence[Score]) -> list[Score]:
     for s in sorted(scores, key=lambda s: -s.gain):
         best.setdefault(s.candidate.name, []).append(s)
     top = max((s[0].gain for s in best.values()), default=0.0)
-    names = sorted(best.values(), key=lambda group: -group[0].gain)[:TRIED]
+    names = sorted(best.values(), key=lambda group: -group[0].gain)[: 2 * TRIED]
     out = []
     for group in names:
         if group[0].gain < max(PROMISING * top, 1e-9):
@@ -97,7 +170,9 @@ def _promising(scores: Sequence[Score]) -> list[Score]:
     return out
 
 
-def _second(space: Space, best: Joint, singles: Sequence[Joint], candidates: Sequence[Candidate]) -> Joint | None:
+def _second(
+    space: Space, best: Joint, singles: Sequence[Joint], candidates: Sequence[Candidate], unseen: HeldOut
+) -> Joint | None:
     """The best single effects, each with the candidate that explains most of what it leaves."""
     found: list[Joint] = []
     for first in _different(singles)[:2]:
@@ -109,7 +184,7 @@ def _second(space: Space, best: Joint, singles: Sequence[Joint], candidates: Seq
         for s in _promising(scores)[:2]:
             joint = fit_jointly(there, [s], 8)
             found.append(Joint(joint.simulator, joint.likelihood, joint.fit, (*first.added, *joint.added)))
-    found.sort(key=lambda j: j.fit.point.cost)
+    found.sort(key=lambda j: j.fit.point.cost + unseen.cost(j))
     return converge(found[0]) if found else None
 
 

@@ -11,16 +11,16 @@ from compass_ros.calibration.least_squares import Point, minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import Refined, covariance, polish
-from compass_ros.discovery.candidates import candidates
-from compass_ros.discovery.choose import ENOUGH, NEEDED, PAIR_ENOUGH, SMALL, Choice, choose, noise_cost
+from compass_ros.discovery.candidates import Candidate, candidates
+from compass_ros.discovery.choose import NEEDED, Choice, HeldOut, choose, held_out, noise_cost
 from compass_ros.discovery.formula import Proposal, propose
 from compass_ros.discovery.impulses import impulses
+from compass_ros.discovery.information import information
 from compass_ros.discovery.joint import Joint
 from compass_ros.discovery.maps import TableMap, residual_map
 from compass_ros.discovery.next_shot import next_experiment
 from compass_ros.discovery.null import Null, simulate_null
 from compass_ros.discovery.plan import plan_of
-from compass_ros.discovery.information import information
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import score
 from compass_ros.discovery.unknown import whereabouts
@@ -34,6 +34,7 @@ from compass_ros.types import (
     Mismatch,
     Progress,
     Report,
+    Verdict,
 )
 
 LEAST_GAIN = 10.0
@@ -106,19 +107,21 @@ def discover(
     if not _something(space, scores, null, noise):
         return found.none(scores)
     tell("fit effects", 0.4)
-    choice = choose(space, scores, asked)
+    unseen = held_out(judge, space)
+    choice = choose(space, scores, asked, unseen)
     again = _restarted(refined, choice, simulator)
     if again is not None:  # the plain simulator does better than it was thought to: begin again from there
         space, scores = _screen(simulator, again, asked)
         found = replace(found, refined=again, null=simulate_null(space, scores, noise, seed))
         if not _something(space, scores, found.null, noise):
             return found.none(scores)
-        choice = choose(space, scores, asked)
+        unseen = held_out(judge, space)
+        choice = choose(space, scores, asked, unseen)
     tell("weigh effects", 0.9)
-    return found.judged(space, choice)
+    return found.judged(space, choice, unseen)
 
 
-def _screen(simulator: Simulator, refined: Refined, asked: Sequence) -> tuple[Space, list[Score]]:  # type: ignore[type-arg]
+def _screen(simulator: Simulator, refined: Refined, asked: Sequence[Candidate]) -> tuple[Space, list[Score]]:
     space = Space(simulator, refined.likelihood, refined.fit, impulses(simulator, refined.likelihood, refined.fit))
     scores = [score(space, candidate) for candidate in asked]
     return space, sorted(scores, key=lambda s: -s.gain)
@@ -171,17 +174,15 @@ class Finding:
         )
         return Discovery(Mismatch("none", None, (), self.undetectable, "", sentence), tried=tried, before=self.before)
 
-    def judged(self, space: Space, choice: Choice) -> Discovery:
+    def judged(self, space: Space, choice: Choice, unseen: HeldOut) -> Discovery:
         """Named, ambiguous, unknown or failed."""
         best = choice.singles[0] if choice.singles else None
-        if best is not None and (choice.share(best) >= ENOUGH or choice.remainder(best) < SMALL) and self._helps(best):
-            return self.named(best, choice, (self._equals(best, choice),))
+        if best is not None and choice.enough(best) and unseen.helps(best):
+            return self.named(best, choice, (self._equals(best, choice, unseen),))
         pair = choice.pair
-        if pair is not None and best is not None and self._helps(pair):
-            enough = choice.share(pair) >= PAIR_ENOUGH or choice.remainder(pair) < SMALL
-            needed = choice.share(pair) - choice.share(best) > NEEDED
-            if enough and needed:
-                return self.named(pair, choice, ((), ()))
+        both = pair is not None and best is not None and choice.share(pair) - choice.share(best) > NEEDED
+        if pair is not None and both and choice.enough(pair) and unseen.helps(pair):
+            return self.named(pair, choice, ((), ()))
         return self.unknown(space, choice)
 
     def named(self, joint: Joint, choice: Choice, equal: tuple[tuple[Joint, ...], ...]) -> Discovery:
@@ -210,7 +211,7 @@ class Finding:
             lacks = "one of these: " + "; ".join(a.effect.sentence for j in rivals for a in j.added)
         values = "; ".join(value_of(f) for f in findings)
         sentence = f"{place(where)}, the simulator lacks {lacks}; {values}; {self._errors(joint)}."
-        verdict = "ambiguous" if ambiguous else "named"
+        verdict: Verdict = "ambiguous" if ambiguous else "named"
         mismatch = Mismatch(verdict, where, tuple(findings), self.undetectable, following, sentence)
         return self._with(joint, mismatch, choice, std)
 
@@ -248,27 +249,21 @@ class Finding:
             after,
         )
 
-    def _equals(self, best: Joint, choice: Choice) -> tuple[Joint, ...]:
-        """Other effects that explain the recordings as well: within EQUAL of log evidence, or of the gain's share."""
+    def _equals(self, best: Joint, choice: Choice, unseen: HeldOut) -> tuple[Joint, ...]:
+        """Other effects that explain all recordings as well: within EQUAL of log evidence, or of the gain's share."""
         kappa = self.noise.correlation_time
-        top = best.log_evidence(kappa)
+
+        def evidence(joint: Joint) -> float:
+            return joint.log_evidence(kappa) - unseen.cost(joint) / kappa
+
+        top = evidence(best)
         margin = max(EQUAL, EQUAL_SHARE * choice.excess / kappa)
         seen, out = {best.name}, []
         for joint in choice.singles[1:]:
-            if joint.name not in seen and top - joint.log_evidence(kappa) < margin and self._helps(joint):
+            if joint.name not in seen and top - evidence(joint) < margin:
                 out.append(joint)
             seen.add(joint.name)
         return tuple(out)
-
-    def _helps(self, joint: Joint) -> bool:
-        """Whether held-out episodes, weighted by how far they can be trusted, are predicted better."""
-        return self._loss(joint.simulator, joint.fit.point.values) < self._loss(
-            self.simulator, self.refined.fit.point.values
-        )
-
-    def _loss(self, simulator: Simulator, values: Floats) -> float:
-        residual = self._residual(simulator, values)
-        return float(np.nanmedian(np.nanmean(np.minimum(residual**2, 400.0), axis=(1, 2))))
 
     def _residual(self, simulator: Simulator, values: Floats) -> Floats:
         tiled = np.tile(values, (len(self.judge.inputs), 1))
@@ -325,5 +320,3 @@ class Finding:
             )
             for joint in choice.singles
         )
-
-

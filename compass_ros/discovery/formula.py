@@ -2,8 +2,8 @@
 
 The regression is in the space of the recordings, not of differentiated data: each term's acceleration along the
 calibrated paths is carried by the impulse responses into the residual, and the parameters take their part first. What
-is left is a linear problem in the coefficients. Its best sets of terms (all up to EXHAUSTIVE, then grown one by one) are
-weighed against each other by the extended BIC (Chen and Chen 2008), which counts how many sets were tried. The idea
+is left is a linear problem in the coefficients. Its best sets of terms (all up to EXHAUSTIVE, then grown one by one)
+are weighed against each other by the extended BIC (Chen and Chen 2008), which counts how many sets were tried. The idea
 of a library of terms is SINDy's (Brunton, Proctor and Kutz 2016). A term more than the full simulator and held-out
 episodes ask for is not taken.
 """

@@ -1,9 +1,9 @@
 """What a short push on each body at each moment would do to the recordings.
 
-A force that acts along the way moves a trajectory as the sum of what its pushes do, one after the other, through all later
-collisions. So a few rollouts with unit pushes at K moments give the tangent of every force field, of any shape, without
-rolling it out: the field's accelerations along the calibrated paths are the weights. The pushes are hats in time, so the
-weights interpolate linearly.
+A force that acts along the way moves a trajectory as the sum of what its pushes do, one after the other, through all
+later collisions. So a few rollouts with unit pushes at K moments give the tangent of every force field, of any shape,
+without rolling it out: the field's accelerations along the calibrated paths are the weights. The pushes are hats in
+time, so the weights interpolate linearly.
 """
 
 from __future__ import annotations
@@ -67,7 +67,9 @@ def impulses(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> Impulses
     pushed = simulator.with_effects([Attached(_PUSH, (name,)) for name in movers])
     cell = len(simulator.cell.parameters)
     cases = [(k, n, a) for k in range(MOMENTS) for n in range(len(movers)) for a in range(2)]
-    values = np.tile(np.concatenate([fit.point.values[:cell], np.tile([0.0, 0.0, 0.0, half], len(movers))]), (len(cases), 1))
+    values = np.tile(
+        np.concatenate([fit.point.values[:cell], np.tile([0.0, 0.0, 0.0, half], len(movers))]), (len(cases), 1)
+    )
     size = SPEED_CHANGE / half
     for row, (k, n, a) in zip(values, cases, strict=True):
         row[cell + 4 * n + a] = size
@@ -79,4 +81,6 @@ def impulses(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> Impulses
     change = (there.reshape(len(cases), episodes, -1) - fit.linear.residual.reshape(episodes, -1)) / size
     base = np.tile(fit.point.values[:cell], (episodes, 1))
     paths = simulator.paths(base, inputs, moments, movers)
-    return Impulses(movers, moments, paths, simulator.masses(fit.point.values[:cell], movers), np.moveaxis(change, 0, -1))
+    return Impulses(
+        movers, moments, paths, simulator.masses(fit.point.values[:cell], movers), np.moveaxis(change, 0, -1)
+    )

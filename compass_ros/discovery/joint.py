@@ -12,7 +12,7 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
-from compass_ros.types import Floats
+from compass_ros.types import Floats, Ints
 
 _SHARES = (0.0, 0.15, 0.4, 0.7, 1.0)
 """Parts of the first-order step that are tried as a start."""
@@ -39,7 +39,7 @@ class Joint:
 
 
 def widened(simulator: Simulator, likelihood: Likelihood, added: Sequence[Attached]) -> tuple[Simulator, Likelihood]:
-    """A simulator and likelihood with more effects; priors wide compared with a modest effect, bounded by what is physical."""
+    """A simulator and likelihood with more effects; priors wide beside a modest effect, bounded by what is physical."""
     wider = simulator.with_effects([*simulator.effects, *added])
     quantities = [q for a in added for q in a.effect.quantities]
     mean = [0.0 if q.amplitude else q.start for q in quantities]
@@ -80,7 +80,9 @@ def fit_jointly(space: Space, scores: Sequence[Score], iterations: int, toleranc
 
 def converge(joint: Joint, iterations: int = 8) -> Joint:
     """To the end, with differences at the solution."""
-    fit = minimise(joint.likelihood, joint.fit.point, joint.fit.free, iterations, joint.fit.robust, 0.3, joint.fit.linear)
+    fit = minimise(
+        joint.likelihood, joint.fit.point, joint.fit.free, iterations, joint.fit.robust, 0.3, joint.fit.linear
+    )
     return replace(joint, fit=fit)
 
 
@@ -99,7 +101,7 @@ def _parameter_step(space: Space, scores: Sequence[Score]) -> Floats:
     return np.asarray(-space.inverse @ gradient)
 
 
-def _extended(space: Space, likelihood: Likelihood, point: Point, residual: Floats, free: np.ndarray) -> Linear:
+def _extended(space: Space, likelihood: Likelihood, point: Point, residual: Floats, free: Ints) -> Linear:
     """The base's differences with those of the new quantities at the start."""
     old = space.fit.linear
     new = free[old.jacobian.shape[-1] :]

@@ -33,8 +33,8 @@ class Null:
 def simulate_null(space: Space, scores: Sequence[Score], noise: Noise, seed: int) -> Null:
     """Noise of the recordings' own correlation through the first-order screen, at the shapes that the screen chose.
 
-    The screen chose the shapes to please the real residual, so each candidate's gain under the null counts twice over for
-    each shape that was free: a search over k shapes gains about k / 2 more than a fixed one (Wilks 1938).
+    The screen chose the shapes to please the real residual; a search over k free shapes gains about k / 2 more than a
+    fixed one (Wilks 1938), which each draw is given on top.
     """
     rng = np.random.default_rng(seed)
     tangents = np.stack([s.tangent for s in scores if np.any(s.tangent)], axis=1) if scores else np.zeros((1, 0))

@@ -1,9 +1,9 @@
 """What each candidate could explain, to first order: its tangent, projected off those of the parameters.
 
 Everything happens in the space of the calibrated residual r [sigma]. A candidate with tangent T (one column for each
-amplitude) lowers the cost by 1/2 g' S^-1 g with g = T'r and S = T'T, both after the parameters have taken what they can:
-S = T'T - T'J (J'J + 1)^-1 J'T. For forces, T = R a with R the impulse responses and a the accelerations along the paths,
-so that shapes (a centre, a radius, a frequency) are searched without a rollout.
+amplitude) lowers the cost by 1/2 g' S^-1 g with g = T'r and S = T'T, both after the parameters have taken what they
+can: S = T'T - T'J (J'J + 1)^-1 J'T. For forces, T = R a with R the impulse responses and a the accelerations along the
+paths, so that shapes (a centre, a radius, a frequency) are searched without a rollout.
 """
 
 from __future__ import annotations
@@ -178,7 +178,7 @@ def _at(space: Space, candidate: Candidate, shapes: Floats) -> tuple[Floats, flo
     )
     unit = np.diag([q.scale for q in quantities])[amplitude_of]
     if candidate.attached.effect.superposes:
-        amplitudes, gain = solve(*space.reduced(space.weights(candidate, shapes, unit)), low, high, 20 * prior)
+        amplitudes, gain = solve(*space.reduced(space.weights(candidate, shapes, unit)), low, high, 20.0 * prior)
         numbers = shapes.copy()
         numbers[amplitude_of] = amplitudes
         return numbers, gain
@@ -187,7 +187,7 @@ def _at(space: Space, candidate: Candidate, shapes: Floats) -> tuple[Floats, flo
         ray = np.cos(angle) * unit[0] + np.sin(angle) * unit[1]
         top = float(np.max(np.abs(ray)))
         size, gain = solve(*space.reduced(space.weights(candidate, shapes, ray[None])),
-                           np.zeros(1), np.array([high.min()]), 20 * prior[:1])  # fmt: skip
+                           np.zeros(1), np.array([high.min()]), 20.0 * prior[:1])  # fmt: skip
         if gain > best[1]:
             best = (shapes + ray / top * size[0], gain)
     return best

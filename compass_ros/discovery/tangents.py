@@ -19,7 +19,7 @@ def _score_rolled_out(space: Space, candidate: Candidate) -> Score:
     columns = differences(space, candidate)
     scale = np.array([q.scale for q in quantities])
     low, high = (np.array([getattr(q, side) for q in quantities]) for side in ("low", "high"))
-    numbers, gain = solve(*space.reduced_tangent(columns), low, high, 20 * scale)
+    numbers, gain = solve(*space.reduced_tangent(columns), low, high, 20.0 * scale)
     return Score(candidate, numbers, gain, columns @ numbers)
 
 

@@ -38,7 +38,7 @@ def whereabouts(space: Space, choice: Choice) -> tuple[Where, bool]:
 
 
 def _kernel(space: Space, objects: tuple[str, ...]) -> Floats:
-    """(E K N, E K N) covariance of a push at all moments of all episodes: smooth in place, so that episodes share it."""
+    """(E K N, E K N) covariance of a push at all moments of all episodes: smooth in place, so episodes share it."""
     pushes = space.pushes
     place = pushes.paths[..., :2].reshape(-1, 2)
     time = np.broadcast_to(pushes.moments[None, :, None], pushes.paths.shape[:3]).ravel()
