@@ -160,8 +160,8 @@ def minimise(
 ) -> Fit:
     """Levenberg-Marquardt from a point until a step would lower the cost by less than `tolerance` (log likelihood).
 
-    Differences are taken anew only where the model failed to predict what a step did; otherwise Broyden's update keeps it
-    going, which costs no rollout. `linear`: differences that are known already near the point. `fresh`: end with
+    Differences are taken anew only where the model failed to predict what a step did; otherwise Broyden's update keeps
+    it going, which costs no rollout. `linear`: differences that are known already near the point. `fresh`: end with
     differences at the solution, as standard errors need them. `steps`: (p,) of the first differences, where known.
     """
     damping = 1e-3

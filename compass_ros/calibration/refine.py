@@ -1,8 +1,8 @@
 """Exact values of the parameters that matter: the simulator in the loop, on a horizon that grows.
 
 A whole trajectory through several collisions has many minima; its beginning has one. So the fit starts with the
-beginning of each episode and follows the solution as more is added. It starts with the parameters that move the trajectories
-most, and frees the others, down to those that the recordings can just feel, when the whole episode fits.
+beginning of each episode and follows the solution as more is added. It starts with the parameters that move the
+trajectories most, and frees the others, down to those that the recordings can just feel, when the whole episode fits.
 """
 
 from __future__ import annotations
