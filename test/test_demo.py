@@ -16,7 +16,7 @@ import pytest
 from compass_ros.cells import load
 from compass_ros.episodes import find_bags, read_episodes
 from test.episodes.planted import PUCKS
-from test.nodes.harness import SHARED_MEMORY, held_locks, until
+from test.nodes.harness import SHARED_MEMORY, held_locks, locks_in_use, until
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
@@ -28,6 +28,7 @@ class Demo:
         self.out = folder / "demo"
         self.log = folder / "log"
         self._nodes: dict[int, list[Path]] = {}
+        self._there_before = set(SHARED_MEMORY.iterdir())
         with self.log.open("wb") as log:
             self.process = subprocess.Popen(
                 [sys.executable, "-m", "compass_ros.cli", "demo", "--out", str(self.out), *words],
@@ -46,10 +47,15 @@ class Demo:
         return self.process.poll() is not None
 
     def left(self) -> list[str]:
-        """Processes and shared memory of its nodes that are still there."""
+        """Processes and shared memory of its nodes that are still there, and not another program's of this machine.
+
+        Ports of shared memory are handed out across all domains: a free one is taken by whoever comes next.
+        """
         processes = [f"process {pid}" for pid in self._nodes if Path("/proc", str(pid)).exists()]
         files = {lock.name.removesuffix(end) for locks in self._nodes.values() for lock in locks for end in ("_el", "")}
-        return processes + [name for name in sorted(files) if (SHARED_MEMORY / name).exists()]
+        others = {SHARED_MEMORY / lock.name.removesuffix(end) for lock in locks_in_use() for end in ("_el", "")}
+        ours = {SHARED_MEMORY / name for name in files} - self._there_before - others
+        return processes + [path.name for path in sorted(ours) if path.exists()]
 
     @property
     def nodes(self) -> int:

@@ -51,6 +51,17 @@ def held_locks(pid: int) -> list[Path]:
     return [path for path in held if path.parent == SHARED_MEMORY and path.name.endswith("_el")]
 
 
+def locks_in_use() -> set[Path]:
+    """The lock files that any process of this machine holds now."""
+    held: set[Path] = set()
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            held.update(held_locks(int(process.name)))
+        except (FileNotFoundError, ProcessLookupError, PermissionError):
+            continue  # ended in the meantime, or another user's
+    return held
+
+
 def remove_shared_memory(name: str) -> None:
     """Remove one segment or port of Fast DDS whose owner is dead."""
     for file in (name, f"{name}_el", f"{name}_sl", f"sem.{name}_mutex"):
