@@ -109,6 +109,7 @@ class Calibrator(ManagedNode):
     def activate(self) -> None:
         """Raises ConfigError where the versions on disk are damaged."""
         self._the_operator.begin()
+        self._show_earlier()
         self._first_goal = self._take_up()
         if self._first_goal is not None:
             self._start_timer = self.create_timer(0.1, self._on_start)
@@ -133,6 +134,17 @@ class Calibrator(ManagedNode):
 
     def _output(self) -> Path:
         return Path(self.get_parameter("output").value)
+
+    def _show_earlier(self) -> None:
+        """A result that lies in the output is a proposal, also for those who look after a restart."""
+        output = self._output().expanduser().absolute()
+        if not (output / "result.json").is_file():
+            return
+        try:
+            self._publish(output / "result.json", "")
+            self._the_operator.propose(output)
+        except ConfigError as error:
+            self.get_logger().warning(one_line(str(error)))
 
     def _take_up(self) -> Calibrate.Goal | None:
         """What to begin with: a calibration that was cut off, or the bags that are named."""
