@@ -59,8 +59,13 @@ def plan(
     typer.echo(f"written: {out}")
 
 
-def look(simulator: Simulator, given: Floats | None, n: int, rate: float, seed: int, propose: bool) -> Planned:
-    """The table of the given shots, or of `n` drawn ones. Raises DataError where they cannot answer."""
+def look(
+    simulator: Simulator, given: Floats | None, n: int, rate: float, seed: int, propose: bool, tries: int = POOL
+) -> Planned:
+    """The table of the given shots, or of `n` drawn ones; `tries` shots for each one of a proposed set.
+
+    Raises DataError where the shots cannot answer.
+    """
     import numpy as np
 
     from compass_ros.discovery.candidates import candidates
@@ -75,7 +80,7 @@ def look(simulator: Simulator, given: Floats | None, n: int, rate: float, seed: 
     inputs = completed(cell, actions)
     warnings = objections(cell, inputs, rate)
     count, fields = len(inputs), len(cell.action)
-    pool = draw(simulator, POOL * count, rng) if propose else inputs[:0]
+    pool = draw(simulator, tries * count, rng) if propose else inputs[:0]
     space = linearised(simulator, np.concatenate([inputs, pool]), rate, cell.spec.noise_m)
     known = information(space, candidates(simulator))
     plan = plan_of(known.of_shots(np.arange(count)))

@@ -38,7 +38,7 @@ def print_plan(found: Planned, console: Console | None = None) -> None:
     if found.plan.undetectable:
         out.print(Text.assemble(("These shots cannot show: ", "bold"), ", ".join(found.plan.undetectable)))
     if better is not None:
-        seen = [np.log([min(v.at_five_sigma / v.best.bound, 1.0) for v in _shown(p)]) for p in (found.plan, better)]
+        seen = [np.log([_part(v) for v in _shown(p)]) for p in (found.plan, better)]
         lost = [sum(not v.detectable for v in _shown(p)) for p in (found.plan, better)]
         smaller = float(np.exp(np.mean(seen[0] - seen[1])))
         said = (
@@ -58,7 +58,7 @@ def _effects(plan: Plan, better: Plan | None) -> Table:
     )
     table = Table(caption=Text(caption, "dim"), caption_justify="left")
     proposed = ["proposed"] if better else []
-    for heading in ("effect: amplitude", "at 5 sigma", *proposed, "unit", "absorbed", "not told from"):
+    for heading in ("effect", "at 5 sigma", *proposed, "absorbed", "not told from"):
         right = heading in ("at 5 sigma", "proposed", "absorbed")
         table.add_column(heading, justify="right" if right else "left", overflow="fold")
     others = _shown(better) if better else []
@@ -66,15 +66,19 @@ def _effects(plan: Plan, better: Plan | None) -> Table:
         twins = [t for t in v.twins if " of " not in t or len(v.objects) == 1]
         for k, seen in enumerate(v.amplitudes):
             style = "" if v.detectable else "dim"
-            cells = [f"{_title(v)}: {seen.name}", _number(seen)]
+            cells = [f"{_title(v)} {seen.name} {_unit(seen)}", _number(seen)]
             cells += [_number(others[i].amplitudes[k])] if better else []
-            cells += [seen.unit, f"{seen.absorbed:.1%}", ", ".join(twins) if not k else ""]
+            cells += [f"{seen.absorbed:.1%}", ", ".join(twins) if not k else ""]
             table.add_row(*(Text(c, style) for c in cells))
     return table
 
 
 def _title(v: Visible) -> str:
     return f"{v.name} ({v.objects[0]})" if len(v.objects) == 1 else v.name
+
+
+def _unit(seen: Seen) -> str:
+    return f"[{seen.unit}]" if seen.unit != "1" else ""
 
 
 def _number(seen: Seen) -> str:
@@ -88,13 +92,13 @@ def _parameters(plan: Plan, better: Plan | None) -> Table:
     caption = Text(f"{hidden} further parameters stay as unknown as they are" if hidden else "", "dim")
     table = Table(caption=caption, caption_justify="left")
     proposed = ["proposed"] if better else []
-    for heading in ("parameter", "at 5 sigma", *proposed, "known to", "unit", "absorbed"):
-        table.add_column(heading, justify="left" if heading in ("parameter", "unit") else "right", overflow="fold")
+    for heading in ("parameter", "at 5 sigma", *proposed, "known to", "absorbed"):
+        table.add_column(heading, justify="left" if heading == "parameter" else "right", overflow="fold")
     for i in felt:
         seen = plan.parameters[i]
-        cells = [seen.name, f"{seen.at_five_sigma:.2g}"]
+        cells = [f"{seen.name} {_unit(seen)}", f"{seen.at_five_sigma:.2g}"]
         cells += [f"{better.parameters[i].at_five_sigma:.2g}"] if better else []
-        table.add_row(*(Text(c) for c in (*cells, f"{seen.bound:.2g}", seen.unit, f"{seen.absorbed:.1%}")))
+        table.add_row(*(Text(c) for c in (*cells, f"{seen.bound:.2g}", f"{seen.absorbed:.1%}")))
     return table
 
 
@@ -145,27 +149,32 @@ def _seen(seen: Seen) -> Mapping[str, Any]:
     return {"name": seen.name, "unit": seen.unit, "at_five_sigma": five, "absorbed": seen.absorbed, "bound": seen.bound}
 
 
+def _part(v: Visible) -> float:
+    """Amplitude at 5 sigma in parts of the largest that is physical, at most 1."""
+    return min(v.at_five_sigma / v.best.bound, 1.0)
+
+
 def figure(found: Planned) -> Figure:
-    """Amplitude at 5 sigma of each effect, in parts of the largest that is physical; logarithmic."""
-    rows = [v for v in _shown(found.plan) if v.detectable]
-    order = np.argsort([v.at_five_sigma / v.best.bound for v in rows], kind="stable")
+    """Amplitude at 5 sigma of each effect, in parts of the largest that is physical; logarithmic, 1: never seen."""
     better = {(v.name, v.objects): v for v in found.better.effects} if found.better else {}
+    rows = [v for v in _shown(found.plan) if v.detectable or (better and better[v.name, v.objects].detectable)]
+    order = np.argsort([_part(v) for v in rows], kind="stable")
     with rc_context(cast(Any, STYLE)):
         drawn = Figure(figsize=(6.4, 0.9 + 0.19 * len(rows)), layout="constrained")
         axes = drawn.add_subplot()
         for place, i in enumerate(order):
             v = rows[i]
-            planned = v.at_five_sigma / v.best.bound
+            planned = _part(v)
             told = "o" if not v.twins else "D"
             axes.plot(planned, place, told, color=LIGHT["nominal"], ms=4.5)
             if better:
                 other = better[v.name, v.objects]
-                there = other.at_five_sigma / other.best.bound
+                there = _part(other)
                 axes.plot([planned, there], [place, place], color=LIGHT["line"], lw=2, zorder=0)
                 axes.plot(there, place, "o" if not other.twins else "D", color=LIGHT["with_effects"], ms=4.5)
         axes.set_yticks(range(len(rows)), [_title(rows[i]) for i in order], size=7)
         axes.set_xscale("log")
-        axes.set_xlabel("seen at 5 sigma, in parts of the largest that is physical; diamond: has a twin")
+        axes.set_xlabel("seen at 5 sigma, in parts of the largest that is physical; diamond: not told from another")
         if better:
             axes.set_title("planned (orange) and proposed shots (green)")
     return drawn
