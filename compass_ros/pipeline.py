@@ -47,7 +47,7 @@ def calibrate(
     fit, held_out = split(episodes, config)
     simulator = Simulator(cell, threads=config.threads)
     data, judge = recordings(cell, fit), recordings(cell, held_out or fit)
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m)
+    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
     problem = pose(simulator, data, noise)
 
     estimate, refined = estimate_parameters(problem, config, report)

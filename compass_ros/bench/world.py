@@ -57,7 +57,7 @@ def build(case: Case, threads: int = 0) -> World:
     clean = _record(teacher, truth, actions, 0.0, 0.0, judge)
     noisy = _record(teacher, truth, actions, case.noise_m, case.missing, judge)
     data = recordings(cell, fit)
-    problem = pose(simulator, data, measure_noise(data.time_s, data.measured, cell.spec.noise_m))
+    problem = pose(simulator, data, measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated))
     if case.start == "random":
         drawn = problem.low + (problem.high - problem.low) * np.random.default_rng([case.seed, 3]).random(len(truth))
         problem = replace(problem, start=drawn, likelihood=replace(problem.likelihood, prior_mean=drawn))

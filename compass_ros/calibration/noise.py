@@ -31,8 +31,17 @@ class Noise:
         return (1 + self.correlation) / (1 - self.correlation)
 
 
-def measure_noise(time_s: Floats, measured: Floats, expected: float) -> Noise:
-    """From (E, F) times since the command and (E, F, C) measurements; `expected` [m] where neither can be measured."""
+def measure_noise(time_s: Floats, measured: Floats, expected: float, stated: Floats | None = None) -> Noise:
+    """From (E, F) times since the command and (E, F, C) measurements; `expected` [m] where neither can be measured.
+
+    `stated`: (C,) what the sensor says of itself. It knows of errors that do not change from frame to frame, which no
+    scatter shows, so the larger of both counts.
+    """
+    noise = _measured_noise(time_s, measured, expected)
+    return noise if stated is None else Noise(np.maximum(noise.sigma, stated), noise.correlation)
+
+
+def _measured_noise(time_s: Floats, measured: Floats, expected: float) -> Noise:
     still = _still_residuals(time_s, measured)
     flight = _flight_sigma(measured)
     columns = measured.shape[2]

@@ -101,11 +101,26 @@ def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True)
 def covariance(likelihood: Likelihood, fit: Fit) -> Floats:
     """(n, n) of free parameters, then launches, in the prior's standard deviations.
 
-    The data's part of the Hessian is divided by the correlation time: neighbouring frames repeat each other.
+    The data's part of the Hessian is divided by what neighbouring frames repeat of each other, in the noise or in the
+    residual, and by the residual's variance where that is above the noise: what the model does not explain is no
+    information about its parameters.
     """
     hessian, _ = normal_equations(likelihood, fit.point, fit.linear, fit.free, fit.robust)
     prior = np.eye(len(hessian))
-    return np.asarray(np.linalg.inv((hessian - prior) / likelihood.correlation_time + prior))
+    repeated = max(likelihood.correlation_time, residual_correlation_time(likelihood, fit))
+    share = 1 / (repeated * max(chi_square(likelihood, fit), 1.0))
+    return np.asarray(np.linalg.inv((hessian - prior) * share + prior))
+
+
+def residual_correlation_time(likelihood: Likelihood, fit: Fit) -> float:
+    """Frames that one independent residual is worth, from the correlation of neighbours as in an AR(1) process."""
+    residual = np.clip(residual_at(likelihood, fit.point), -fit.robust, fit.robust)
+    seen = ~np.isnan(likelihood.measured)
+    both = seen[:, 1:] & seen[:, :-1]
+    product = float(np.sum(np.where(both, residual[:, 1:] * residual[:, :-1], 0.0))) / max(int(both.sum()), 1)
+    square = float(np.mean(residual[seen] ** 2)) if seen.any() else 1.0
+    correlation = float(np.clip(product / max(square, 1e-12), 0.0, 0.97))
+    return (1 + correlation) / (1 - correlation)
 
 
 def calmed(likelihood: Likelihood, linear: Linear) -> Likelihood:

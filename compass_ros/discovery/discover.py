@@ -20,11 +20,12 @@ from compass_ros.discovery.joint import Joint
 from compass_ros.discovery.maps import TableMap, residual_map
 from compass_ros.discovery.next_shot import next_experiment
 from compass_ros.discovery.null import Null, simulate_null
-from compass_ros.discovery.plan import plan_of
+from compass_ros.discovery.plan import objections, plan_of
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import score
 from compass_ros.discovery.unknown import whereabouts
 from compass_ros.discovery.words import errors, place, value_of, where_of
+from compass_ros.errors import DataError
 from compass_ros.simulation import Simulator
 from compass_ros.types import (
     EffectFinding,
@@ -41,6 +42,8 @@ LEAST_GAIN = 10.0
 """Log likelihood that an effect must gain, whatever the null says."""
 SOMETHING = 0.06
 """Excess of chi-square above the noise from which something is there although no candidate stands out."""
+NOTICED = 0.25
+"""Least rms movement by what is missing, as a share of the cell's expected noise: less is the tracker's own error."""
 EQUAL = 3.0
 """Log evidence within which two effects are told apart by nothing."""
 EQUAL_SHARE = 0.015
@@ -92,6 +95,12 @@ def discover(
     likelihood = refined.likelihood
     if len(likelihood.inputs) < MIN_EPISODES:
         return not_evaluated(f"{len(likelihood.inputs)} fitted episodes are too few, {MIN_EPISODES} are the least")
+    try:
+        warnings = objections(
+            simulator.cell, likelihood.inputs, 1 / float(np.median(np.diff(likelihood.time_s, axis=1)))
+        )
+    except DataError as error:
+        return Discovery(Mismatch("data_bad", None, (), (), "", f"These recordings cannot answer: {error}."))
 
     def tell(stage: str, done: float) -> bool:
         return report(Progress(stage, 0, 0.7 + 0.3 * done, float("nan"), float("nan")))
@@ -103,7 +112,7 @@ def discover(
     undetectable = plan_of(information(space, asked)).undetectable
     before = residual_map(space)
     tell("screen effects", 0.3)
-    found = Finding(simulator, refined, judge, noise, null, undetectable, before, seed)
+    found = Finding(simulator, refined, judge, noise, null, undetectable, before, seed, warnings)
     if not _something(space, scores, null, noise):
         return found.none(scores)
     tell("fit effects", 0.4)
@@ -128,10 +137,14 @@ def _screen(simulator: Simulator, refined: Refined, asked: Sequence[Candidate]) 
 
 
 def _something(space: Space, scores: Sequence[Score], null: Null, noise: Noise) -> bool:
-    """Whether a candidate or the sum of residuals stands out from the noise."""
+    """Whether a candidate or the sum of residuals stands out from the noise, by an amount that matters."""
     gain = scores[0].gain / noise.correlation_time if scores else 0.0
     floor = noise_cost(space.likelihood, space.fit)
     excess = 2 * (space.fit.point.cost - floor) / space.likelihood.measurements
+    gained = 2 * max(scores[0].gain if scores else 0.0, 0.0) / space.likelihood.measurements
+    moved = float(np.sqrt(max(excess, gained, 0.0)) * np.median(noise.sigma))
+    if moved < NOTICED * space.simulator.cell.spec.noise_m:
+        return False
     return gain > max(LEAST_GAIN, 1.2 * null.largest) or excess > SOMETHING * noise.correlation_time
 
 
@@ -160,6 +173,7 @@ class Finding:
     undetectable: tuple[str, ...]
     before: TableMap | None
     seed: int
+    warnings: tuple[str, ...]
 
     def none(self, scores: Sequence[Score]) -> Discovery:
         """The noise explains everything."""
@@ -172,7 +186,8 @@ class Finding:
             Tried(s.candidate.name, s.candidate.attached.effect.channel, s.gain, 0.0, False, "within the noise")
             for s in scores[:8]
         )
-        return Discovery(Mismatch("none", None, (), self.undetectable, "", sentence), tried=tried, before=self.before)
+        mismatch = Mismatch("none", None, (), self.undetectable, "", sentence)
+        return Discovery(mismatch, tried=tried, before=self.before, warnings=self.warnings)
 
     def judged(self, space: Space, choice: Choice, unseen: HeldOut) -> Discovery:
         """Named, ambiguous, unknown or failed."""
@@ -220,7 +235,8 @@ class Finding:
         where, sure = whereabouts(space, choice)
         if not sure and not choice.singles:
             sentence = "The fit did not reach the noise floor and no place stands out: no verdict."
-            return Discovery(Mismatch("fit_failed", where, (), self.undetectable, "", sentence), before=self.before)
+            mismatch = Mismatch("fit_failed", where, (), self.undetectable, "", sentence)
+            return Discovery(mismatch, before=self.before, warnings=self.warnings)
         proposal: Proposal | None = propose(space, self.judge)
         sentence = f"{place(where)}, something differs that no known effect explains"
         if choice.singles:
@@ -229,7 +245,7 @@ class Finding:
         sentence += f"; {proposal.sentence}" if proposal else "."
         mismatch = Mismatch("unknown", where, (), self.undetectable, "", sentence)
         if proposal is None:
-            return Discovery(mismatch, tried=self._tried(choice, None), before=self.before)
+            return Discovery(mismatch, tried=self._tried(choice, None), before=self.before, warnings=self.warnings)
         return self._with(proposal.joint, mismatch, choice, self._std(proposal.joint))
 
     def _with(self, joint: Joint, mismatch: Mismatch, choice: Choice, std: Floats) -> Discovery:
@@ -247,6 +263,7 @@ class Finding:
             self._tried(choice, joint),
             self.before,
             after,
+            self.warnings,
         )
 
     def _equals(self, best: Joint, choice: Choice, unseen: HeldOut) -> tuple[Joint, ...]:

@@ -14,6 +14,8 @@ from compass_ros.simulation.simulator import Simulator
 from compass_ros.types import QUANTITY_SIZE, Bools, Episode, Floats, Gap, Ints, Track
 
 _NS = 1e-9
+STILL_S = 0.6
+"""Frames earlier than this before the command are left out: somebody may still be placing the objects [s]."""
 GUESSED = 5.0
 """A frame whose stated standard deviation is this many times the track's median was bridged, not seen."""
 
@@ -33,6 +35,8 @@ class Recordings:
     """(S,) control times 0, dt, ..., horizon dt."""
     at_steps: Floats
     """(E, S, C) measured, linearly interpolated at the control times."""
+    stated: Floats
+    """(C,) typical standard deviation of a position as the sensor states it [m]; -inf where it does not."""
 
 
 def recordings(cell: Cell, episodes: Sequence[Episode]) -> Recordings:
@@ -48,7 +52,8 @@ def recordings(cell: Cell, episodes: Sequence[Episode]) -> Recordings:
     steps = cell.control_dt * np.arange(cell.horizon + 1)
     at_steps = np.stack([_at(steps, time, values) for time, values in rows])
     inputs = np.stack([cell.inputs(episode) for episode in episodes])
-    return Recordings(tuple(e.name for e in episodes), inputs, time_s, measured, steps, at_steps)
+    stated = np.nanmedian(np.stack([_stated(cell, episode) for episode in episodes]), axis=0)
+    return Recordings(tuple(e.name for e in episodes), inputs, time_s, measured, steps, at_steps, stated)
 
 
 def _arrange(cell: Cell, episode: Episode) -> tuple[Floats, Floats]:
@@ -59,7 +64,7 @@ def _arrange(cell: Cell, episode: Episode) -> tuple[Floats, Floats]:
         raise DataError(f"{episode.source or episode.name}: no track of {', '.join(missing)}; has {sorted(known)}")
     stamps = np.unique(np.concatenate([known[o.name].stamp_ns for o in cell.objects]))
     time = (stamps - episode.start_ns) * _NS
-    keep = time <= cell.duration + 1e-6
+    keep = (time >= -STILL_S) & (time <= cell.duration + 1e-6)
     stamps, time = stamps[keep], time[keep]
     if np.sum(time >= 0) < 2:
         raise DataError(f"{episode.source or episode.name}: no frames within {cell.duration:g} s after the command")
@@ -76,6 +81,16 @@ def _arrange(cell: Cell, episode: Episode) -> tuple[Floats, Floats]:
             _follow(values[:, column + 3 : column + 7])
         column += size
     return time, values
+
+
+def _stated(cell: Cell, episode: Episode) -> Floats:
+    """(C,) median of the tracks' standard deviations; -inf where the sensor says nothing, or speaks of no position."""
+    stated: list[float] = []
+    for spec in cell.objects:
+        std = episode.track(spec.name).std
+        size = QUANTITY_SIZE[spec.quantity]
+        stated += [-np.inf if std is None or i >= 3 else float(np.median(std)) for i in range(size)]
+    return np.array(stated)
 
 
 def _follow(quaternions: Floats) -> None:

@@ -129,6 +129,9 @@ class Simulator:
             trial.check(self._model)
             if effect.forces is not None:
                 effect.forces(np.array([[q.start or q.scale for q in effect.quantities]]), self._context(trial, values))
+            if effect.model is not None:
+                sizes = np.array([q.scale for q in effect.quantities])
+                effect.model(copy.copy(self._model), sizes, self._context(trial, values))
         except ConfigError:
             return False
         return True
