@@ -77,6 +77,7 @@ def run(
     from compass_ros.cells import load
     from compass_ros.config import calibration_config
     from compass_ros.episodes import Source, read_episodes
+    from compass_ros.operation.doubts import doubts
     from compass_ros.pipeline import calibrate as pipeline
     from compass_ros.reporting import print_result
     from compass_ros.results import make_writable, write_all
@@ -89,10 +90,14 @@ def run(
     make_writable(out)  # now, and not after minutes of work
     with _shown(style) as report:
         result, found = pipeline(episodes, cell, validated, report)
-    result = replace(result, budget=replace(result.budget, wall_seconds=time.monotonic() - started))
+    said = (*doubts(cell, episodes), *result.warnings)
+    budget = replace(result.budget, wall_seconds=time.monotonic() - started)
+    result = replace(result, budget=budget, warnings=said)
     write_all(result, found, cell, out, shlex.join(["compass", *sys.argv[1:]]), truth or {})
     if style is ProgressStyle.bar:
         print_result(result, truth)
+        for warning in said:
+            typer.echo(f"note: {warning}", err=True)
         print(f"report: {os.path.relpath(out / 'report.html')}")
     return result
 

@@ -256,6 +256,8 @@ class Calibrator(ManagedNode):
     def _publish(self, path: Path, message: str) -> Calibrate.Result:
         """The result as topics and as the action's answer. Raises ConfigError when it cannot be read."""
         result = read_result(path)
+        for warning in result["warnings"]:
+            self.get_logger().warning(one_line(warning))
         header = self._header("table")
         self._parameters_topic.publish(convert.parameters_message(result, header, str(path)))
         self._graph_topic.publish(convert.graph_message(result, header))

@@ -16,6 +16,9 @@ from compass_ros.simulation.effects.exported import read_effects
 from compass_ros.simulation.replay import Recordings, Replay, recordings
 from compass_ros.types import Episode, Floats
 
+_ROUNDING = 1e-9
+"""Share of a parameter's range that is no distance."""
+
 
 @dataclass(frozen=True)
 class Current:
@@ -70,14 +73,21 @@ def current(cell: Cell, version: Path | None = None, threads: int = 0) -> Curren
     if version is None or not (version / "result.json").exists():
         simulator = Simulator(cell, threads=threads)
         return Current(simulator, simulator.defaults)
-    rows = read_result(version / "result.json")["parameters"]
     where = str(version / "result.json")
-    values = cell.values({row["name"]: row["value"] for row in rows}, where)
+    rows = read_result(version / "result.json")["parameters"]
+    values = cell.values({row["name"]: _inside(cell, row["name"], row["value"]) for row in rows}, where)
     if not (version / "effects.yaml").is_file():
         return Current(Simulator(cell, threads=threads), values)
     fitted = read_effects(version / "effects.yaml").effects
     simulator = Simulator(cell, [one.attached for one in fitted], threads)
     return Current(simulator, np.concatenate([values, *(np.array(one.values) for one in fitted)]))
+
+
+def _inside(cell: Cell, name: str, value: float) -> float:
+    """A value at a bound may lie beyond it by its last digits. Raises ConfigError for an unknown name."""
+    parameter = cell.parameters[cell.index(name)]
+    nearest = min(max(value, parameter.low), parameter.high)
+    return nearest if abs(value - nearest) <= _ROUNDING * (parameter.high - parameter.low) else value
 
 
 def sources(cell: Cell) -> list[Source]:

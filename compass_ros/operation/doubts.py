@@ -1,0 +1,61 @@
+"""What is odd about a set of recordings, though each of them can be read: said with the result, never repaired."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from compass_ros.cells import Cell
+from compass_ros.types import Episode, Track
+
+FEW = 8
+"""Fewer episodes than this leave little to hold out."""
+_STILL = 6.0
+"""An object that stays within so many standard deviations of its median has not moved."""
+_STILL_M = 0.002
+"""The least such distance [m or rad]."""
+
+
+def doubts(cell: Cell, episodes: Sequence[Episode]) -> tuple[str, ...]:
+    """One sentence each; empty when nothing is odd."""
+    said = [_few(episodes), _alike(episodes)]
+    said += [_unmoved(spec.name, episodes) for spec in cell.objects]
+    return tuple(filter(None, said))
+
+
+def _few(episodes: Sequence[Episode]) -> str:
+    if len(episodes) >= FEW:
+        return ""
+    many = f"{len(episodes)} episodes are" if len(episodes) > 1 else "one episode is"
+    return f"{many} few: {FEW} or more tell parameters apart and leave some to judge by"
+
+
+def _alike(episodes: Sequence[Episode]) -> str:
+    """Recordings of a real camera are never equal to the last bit."""
+    seen: dict[bytes, str] = {}
+    copies = []
+    for episode in episodes:
+        content = b"".join(track.value.tobytes() for track in episode.tracks)
+        if content in seen:
+            copies.append(episode.name)
+        seen.setdefault(content, episode.name)
+    if not copies:
+        return ""
+    return (
+        f"{len(copies)} of {len(episodes)} episodes are copies of others ({', '.join(copies[:3])}"
+        f"{', ...' * (len(copies) > 3)}): they add nothing, and held-out copies of fitted episodes judge nothing"
+    )
+
+
+def _unmoved(name: str, episodes: Sequence[Episode]) -> str:
+    tracks = [track for episode in episodes for track in episode.tracks if track.object == name]
+    if not tracks or any(map(_moves, tracks)):
+        return ""
+    return f"{name} never moves in {len(episodes)} episodes: nothing can be said about its parameters"
+
+
+def _moves(track: Track) -> bool:
+    spread = np.abs(track.value - np.median(track.value, axis=0)).max()
+    limit = _STILL_M if track.std is None else max(_STILL * float(np.median(track.std)), _STILL_M)
+    return bool(spread > limit)

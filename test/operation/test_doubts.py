@@ -1,0 +1,57 @@
+"""Recordings that can be read and still are odd."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compass_ros.cells import Cell, load
+from compass_ros.operation.current import read
+from compass_ros.operation.doubts import doubts
+from compass_ros.types import Episode
+from test.nodes.recordings import record
+
+
+@pytest.fixture(scope="module")
+def cell() -> Cell:
+    return load("air_hockey")
+
+
+@pytest.fixture(scope="module")
+def sound(cell: Cell, tmp_path_factory: pytest.TempPathFactory) -> list[Episode]:
+    return [read(cell, bag) for bag in record(tmp_path_factory.mktemp("bags"), {}, shots=8, seed=3)]
+
+
+def still(episode: Episode, name: str, noise_m: float) -> Episode:
+    """The episode with an object that is only seen with noise."""
+    rng = np.random.default_rng(len(episode.name))
+    tracks = tuple(
+        replace(track, value=track.value[0] + rng.normal(0, noise_m, track.value.shape))
+        if track.object == name
+        else track
+        for track in episode.tracks
+    )
+    return replace(episode, tracks=tracks)
+
+
+def test_sound_recordings_raise_none(cell: Cell, sound: list[Episode]) -> None:
+    assert doubts(cell, sound) == ()
+    one_moves = [still(e, "puck2", 3e-4) for e in sound[1:]] + [sound[0]]
+    assert doubts(cell, one_moves) == ()
+
+
+def test_a_puck_that_never_moves(cell: Cell, sound: list[Episode]) -> None:
+    (said,) = doubts(cell, [still(episode, "puck2", 3e-4) for episode in sound])
+    assert said == "puck2 never moves in 8 episodes: nothing can be said about its parameters"
+
+
+def test_copies(cell: Cell, sound: list[Episode]) -> None:
+    (said,) = doubts(cell, [replace(sound[0], name=f"copy{i}") for i in range(8)])
+    assert said.startswith("7 of 8 episodes are copies of others (copy1, copy2, copy3, ...)")
+
+
+def test_few(cell: Cell, sound: list[Episode]) -> None:
+    assert doubts(cell, sound[:1])[0].startswith("one episode is few")
+    assert doubts(cell, sound[:5])[0].startswith("5 episodes are few")
