@@ -14,6 +14,8 @@ from pydantic.dataclasses import dataclass
 from compass_ros.errors import ConfigError, nearest
 
 _strict = ConfigDict(extra="forbid")
+_short = reprlib.Repr()
+_short.maxlevel = 2  # the default of 6 levels of 6 entries is a screen full
 
 
 @dataclass(frozen=True, config=_strict)
@@ -99,4 +101,4 @@ def calibration_config(content: Mapping[str, object], where: str = "configuratio
         name = ".".join(str(part) for part in first["loc"])
         known = [f.name for f in (*fields(CalibrationConfig), *fields(CompassConfig))]
         hint = nearest(name.rsplit(".", 1)[-1], known) if first["type"] == "unexpected_keyword_argument" else ""
-        raise ConfigError(f"{where}: {name}: {first['msg']}, found {reprlib.repr(first['input'])}{hint}") from error
+        raise ConfigError(f"{where}: {name}: {first['msg']}, found {_short.repr(first['input'])}{hint}") from error
