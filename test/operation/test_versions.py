@@ -47,13 +47,13 @@ def test_apply_and_revert_go_through_the_versions_and_keep_them(cell: Cell, vers
 
 
 def test_a_value_at_its_bound_may_be_beyond_it_by_a_digit(cell: Cell, tmp_path: Path) -> None:
-    folder = write_calibration(tmp_path / "one", cell, {FRICTION: 0.03})
+    folder = write_calibration(tmp_path / "one", cell, {FRICTION: 0.031234})
     high = cell.parameters[cell.index(FRICTION)].high
     path = folder / "result.json"
     text = path.read_text()
-    path.write_text(text.replace('"value": 0.03,', f'"value": {high * (1 + 1e-15)!r},'))
+    path.write_text(text.replace('"value": 0.031234,', f'"value": {high * (1 + 1e-15)!r},'))
     assert current(cell, folder).values[cell.index(FRICTION)] == high
-    path.write_text(text.replace('"value": 0.03,', f'"value": {high * 1.01!r},'))
+    path.write_text(text.replace('"value": 0.031234,', f'"value": {high * 1.01!r},'))
     with pytest.raises(ConfigError, match="is outside its bounds"):
         current(cell, folder)
 
