@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import platform
 from collections.abc import Sequence
+from functools import partial
 from importlib.metadata import version
 
 import numpy as np
@@ -20,6 +21,7 @@ from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery, discover, not_evaluated
 from compass_ros.errors import DataError
 from compass_ros.simulation import Simulator
+from compass_ros.simulation.factors import factor_distance
 from compass_ros.simulation.replay import Recordings, Replay, recordings
 from compass_ros.types import (
     Budget,
@@ -98,6 +100,7 @@ def pose(simulator: Simulator, data: Recordings, noise: Noise) -> Problem:
         factors=tuple(f.name for f in cell.factors),
         start=simulator.defaults,
         simulated_seconds=cell.duration,
+        apart=partial(factor_distance, cell),
         likelihood=likelihood,
     )
 

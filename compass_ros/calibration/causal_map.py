@@ -1,21 +1,26 @@
 """The default method, `causal-map`: which parameters matter is asked of the simulator, then their values are refined.
 
 The graph is the paper's, parameters to factors, but found by intervention: in a simulator every parameter can be moved
-alone. psi is the share of the difference that is more than noise, e^2 / (e^2 + noise^2), with e the change of the
-factor's trajectory per prior width. The values are the maximum a posteriori of refine.py, with standard errors.
+alone. With e the change of a factor's trajectory per prior width and v = e^2 / sum of e^2 the parameter's share, psi is
+v / (v + 0.003) times e^2 / (e^2 + sigma^2): an edge carries more than the share at which the paper's sparsity weight
+drops one, and more than noise. The values are the maximum a posteriori of refine.py, with standard errors.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from compass_ros.calibration.least_squares import Point, linearise, start
+from compass_ros.calibration.least_squares import Point, start
 from compass_ros.calibration.problem import Allowance, Problem
 from compass_ros.calibration.refine import Refined, refine, standard_errors
 from compass_ros.types import Estimate, Floats, Graph, Iteration, Progress, Report
 
-EDGE_SIGMA = 3.0
-"""An edge needs a change of the factor's trajectory, rms over frames, of this many sigma per prior width."""
+EDGE_SHARE = 0.003
+"""Share of all change above which a parameter is a cause: the paper's sparsity weight, for standardised differences."""
+INTERVENTION = 0.3
+"""How far a parameter is moved to see what it causes, in prior widths."""
 IDENTIFIED = 0.5
 """A parameter is identified where the recordings shrink its prior width at least to this share."""
 
@@ -31,6 +36,11 @@ def causal_map_refined(problem: Problem, report: Report) -> tuple[Estimate, Refi
     trace: list[Iteration] = []
     spent = 0
 
+    def predict(values: Floats, inputs: Floats, time_s: Floats) -> Floats:
+        nonlocal spent
+        spent += len(values)
+        return problem.likelihood.predict(values, inputs, time_s)
+
     def watch(stage: str, done: float, point: Point) -> bool:
         nonlocal spent
         d = problem.mean_differences(point.values[None])[0]
@@ -39,7 +49,7 @@ def causal_map_refined(problem: Problem, report: Report) -> tuple[Estimate, Refi
         return report(Progress(stage, len(trace), 0.95 * done, float(d.mean()), float("nan")))
 
     watch("screen", 0.0, start(problem.likelihood, problem.start))
-    refined = refine(problem.likelihood, problem.start, watch)
+    refined = refine(replace(problem.likelihood, predict=predict), problem.start, watch)
     return to_estimate(problem, refined, tuple(trace)), refined
 
 
@@ -60,12 +70,18 @@ def to_estimate(problem: Problem, refined: Refined, trace: tuple[Iteration, ...]
 
 def intervention_graph(problem: Problem, refined: Refined) -> Graph:
     """psi from interventions at the estimate: how far each prior width moves each factor's trajectory."""
-    likelihood = refined.likelihood
-    everything = np.arange(len(problem.parameters))
-    linear = linearise(likelihood, refined.fit.point, everything, np.full(len(everything), 0.3))
-    effect = np.sqrt(np.mean(np.square(np.clip(linear.jacobian, -1e4, 1e4)), axis=(0, 1)))  # (C, P)
-    factors = len(problem.factors)
-    per_factor = np.array_split(effect, factors, axis=0)
-    e: Floats = np.stack([np.sqrt(np.sum(part**2, axis=0)) for part in per_factor], axis=1)
-    psi = e**2 / (e**2 + EDGE_SIGMA**2)
+    likelihood, point = refined.likelihood, refined.fit.point
+    count, episodes = len(problem.parameters), len(problem.actions)
+    steps = INTERVENTION * likelihood.prior_std
+    steps = np.where(point.values + steps > likelihood.high, -steps, steps)
+    values = np.concatenate([point.values[None], point.values + np.diag(steps)])
+    index = np.tile(np.arange(episodes), count + 1)
+    inputs, time = (likelihood.inputs + point.launch)[index], likelihood.time_s[index]
+    there = likelihood.predict(np.repeat(values, episodes, axis=0), inputs, time)
+    there = there.reshape(count + 1, episodes, *there.shape[1:])
+    moved = problem.apart(there[1:], there[:1]) / INTERVENTION  # (P, E, F, K)
+    effect: Floats = np.sqrt(np.mean(moved**2, axis=(1, 2)))
+    share = effect**2 / np.maximum(np.sum(effect**2, axis=0), 1e-300)
+    noise = float(np.median(likelihood.sigma))
+    psi = share / (share + EDGE_SHARE) * effect**2 / (effect**2 + noise**2)
     return Graph(tuple(p.name for p in problem.parameters), problem.factors, psi, 0.5)

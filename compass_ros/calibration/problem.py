@@ -32,6 +32,8 @@ class Problem:
     """(P,) first guess."""
     simulated_seconds: float
     """Length of one rollout."""
+    apart: Callable[[Floats, Floats], Floats]
+    """(..., C) observations, the same -> (..., K) how far apart by factor [m or rad]."""
     likelihood: Likelihood
     """The same recordings with their noise and prior, for methods that look into the episodes."""
 

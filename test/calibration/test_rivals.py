@@ -49,6 +49,7 @@ class Meter:
             factors=("a", "b"),
             start=np.zeros(len(world.parameters)),
             simulated_seconds=1.0,
+            apart=lambda one, other: np.abs(one - other),
             likelihood=likelihood,
         )
 
