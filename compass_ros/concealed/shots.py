@@ -6,6 +6,7 @@ import numpy as np
 from numpy.random import Generator
 
 from compass_ros.cells import Cell
+from compass_ros.concealed.table import TIME_STEP, Table
 from compass_ros.errors import DataError
 from compass_ros.simulation import Simulator
 from compass_ros.types import Bools, Floats
@@ -18,6 +19,8 @@ CALM, LIVELY = 0.250, 0.005
 """Sensitivity to the speed of the push, rms distance per 0.1 of vel_discount [m]: chaotic above, dull below."""
 STEADY = 0.050
 """The same for its direction, per 0.01 rad."""
+SETTLED = 0.002
+"""What a finer clock may move, rms [m]: a graze that the time step decides tells of numerics alone."""
 _SPEED_STEP = 0.01
 _ANGLE_STEPS = (0.002, 0.01)  # rad; two, since a graze shows at one of them
 _REST = np.array([[-0.15, 0.0], [-0.075, -0.075]])
@@ -32,7 +35,8 @@ def choose_shots(cell: Cell, values: Floats, count: int, rng: Generator) -> Floa
     """(count, A) commands from the cell's reach, for a table whose true parameters are the (P,) values.
 
     A shot is left out where it is chaotic: for the default parameters, as a plan would find, or for the true ones, as
-    a robot finds that repeats it and sees the pucks scatter. Raises DataError where too few are left.
+    a robot finds that repeats it and sees the pucks scatter; and where the time step decides how it goes on. Raises
+    DataError where too few are left.
     """
     pool = _in_reach(cell, rng)
     simulator = Simulator(cell, threads=1)
@@ -50,10 +54,25 @@ def choose_shots(cell: Cell, values: Floats, count: int, rng: Generator) -> Floa
     ]
     by_angle = [_distance(paths(values, angle=step), real) * 0.01 / step for step in _ANGLE_STEPS]
     keep = (np.min(by_speed, axis=0) > LIVELY) & (np.max(by_speed, axis=0) < CALM) & (np.max(by_angle, axis=0) < STEADY)
+    bias = np.array([values[cell.index(f"env@camera@bias_{axis}")] for axis in "xy"])
+    keep[keep] = (
+        _distance(_finer(cell, values, pool[keep], simulator.time_step, real.shape[1]) + np.tile(bias, 2), real[keep])
+        < SETTLED
+    )
     if keep.sum() < count:
         raise DataError(f"{cell.name}: only {keep.sum()} of {len(pool)} shots are fit to be used, {count} are needed")
     features = _features(pool, planned, simulator.time_step * _STRIDE)
     return np.asarray(pool[keep][_diverse(features[keep], count, rng)])
+
+
+def _finer(cell: Cell, values: Floats, inputs: Floats, time_step: float, frames: int) -> Floats:
+    """(N, T, 4) the same paths as a world plays them, at the times of the plain ones."""
+    played = Table(cell, values, inputs, TIME_STEP).play()
+    return np.asarray(
+        played.position[:: round(_STRIDE * time_step / TIME_STEP)]
+        .transpose(1, 0, 2, 3)
+        .reshape(len(inputs), -1, 4)[:, :frames]
+    )
 
 
 def _distance(one: Floats, other: Floats) -> Floats:

@@ -19,6 +19,8 @@ from compass_ros.concealed.contact_forces import Impact, Touch
 from compass_ros.concealed.law import PUCKS, Ingredient, Moment, Sample
 from compass_ros.types import Floats
 
+TIME_STEP = 0.0005
+"""Seconds; half of the library's."""
 DURATION = 2.65
 """Seconds that are played: an episode and what a sensor may look beyond it."""
 

@@ -17,7 +17,7 @@ from compass_ros.concealed.library import in_library_terms
 from compass_ros.concealed.recording import NOISES, episodes, frame_times, seen
 from compass_ros.concealed.shots import choose_shots
 from compass_ros.concealed.strength import Judge, Strength, sized
-from compass_ros.concealed.table import Played, Table
+from compass_ros.concealed.table import TIME_STEP, Played, Table
 from compass_ros.concealed.twins import twins
 from compass_ros.errors import ConfigError
 from compass_ros.types import Episode, Floats
@@ -25,8 +25,6 @@ from compass_ros.types import Episode, Floats
 Kind = Literal["none", "one", "two", "outside"]
 ODDS: Mapping[Kind, float] = {"none": 0.20, "one": 0.55, "two": 0.10, "outside": 0.15}
 SHOTS = 12
-TIME_STEP = 0.0005
-"""Seconds; half of the library's."""
 COARSE_STEP = 0.001
 """For the search of twins, where only changes count."""
 WEAKEST, STRONGEST = 1.5e-3, 8e-3
