@@ -6,7 +6,20 @@ import sys
 
 import typer
 
-from compass_ros.commands import bench, calibrate, conceal, demo, diagnose, plan, prove, record, report, track, unseal
+from compass_ros.commands import (
+    bench,
+    calibrate,
+    conceal,
+    demo,
+    diagnose,
+    plan,
+    prove,
+    real,
+    record,
+    report,
+    track,
+    unseal,
+)
 from compass_ros.commands import import_ as tables
 from compass_ros.errors import CompassError
 
@@ -16,7 +29,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="What went wrong with my simulator? Calibrate it from recordings, and find the physics that it lacks.",
 )
-for module in (demo, plan, track, record, calibrate, diagnose, report, conceal, unseal, prove, bench, tables):
+for module in (demo, plan, track, record, calibrate, diagnose, report, conceal, unseal, prove, bench, real, tables):
     module.add_to(app)
 
 

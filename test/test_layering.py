@@ -21,6 +21,7 @@ JOINS = {
     "operation": 3,
     "concealed": 3,
     "bench": 4,
+    "real": 4,
     "demo": 4,
     "commands": 5,
     "cli": 6,
