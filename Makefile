@@ -3,6 +3,7 @@
 #   make demo    the main job: a virtual robot cell plays shots, and the calibrator finds what is wrong with the simulator
 #   make test    ruff, mypy, all tests
 #   make prove   120 sealed worlds: conceal, calibrate blindly, unseal, count; goes on where it was stopped
+#   make soak    half an hour of full load: memory, lost messages, latency; ARGS="--minutes 5" for less
 #   make lint | bench | bags | lock | clean
 #
 # ARGS are handed on:  make demo ARGS="--shots 20"
@@ -19,7 +20,7 @@ export MUJOCO_GL ?= disable
 SHARED := $(shell find resource config launch -type f -o -type l)
 NATIVE := $(wildcard compass_ros/simulation/native/*.c)
 
-.PHONY: demo prove test lint bench bags install interfaces lock clean
+.PHONY: demo prove test lint bench bags install interfaces lock clean soak
 .DELETE_ON_ERROR:
 
 demo: install
@@ -28,6 +29,9 @@ demo: install
 test: lint
 	$(BIN)/python -m pytest -n 2 -m "not ros" $(ARGS)
 	$(BIN)/python -m pytest -m ros $(ARGS)
+
+soak: install
+	$(BIN)/python scripts/soak.py $(ARGS)
 
 lint: install
 	$(BIN)/ruff check .

@@ -31,6 +31,8 @@ from compass_ros.types import Progress
 
 ORIGIN = "origin.yaml"
 """What a result came from, beside it."""
+POLITELY = ("nice", "-n", "10")
+"""A calibration takes what the tracker and the recorder leave of the machine."""
 
 
 class Outcome(Enum):
@@ -150,7 +152,7 @@ class Job:
         journal = Journal(output, request.described())
         try:
             folder = prepare(output)
-            words = command(request, folder / "result")
+            words = [*POLITELY, *command(request, folder / "result")]
             try:
                 return cls(words, folder, folder / "result", output, request, journal)
             except ConfigError:

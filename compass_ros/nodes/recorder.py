@@ -24,7 +24,7 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 DISCOVERY_PERIOD_S = 0.2
 STATUS_PERIOD_S = 1.0
 
-DEFAULT_TOPICS = ["/puck_tracker/puck1/pose", "/puck_tracker/puck2/pose", "/virtual_cell/shot"]
+DEFAULT_TOPICS = ["puck_tracker/puck1/pose", "puck_tracker/puck2/pose", "virtual_cell/shot"]
 
 
 class RecorderNode(ManagedNode):
@@ -42,7 +42,10 @@ class RecorderNode(ManagedNode):
     def _declare(self) -> None:
         declare = self.declare_fixed
         declare(
-            "topics", DEFAULT_TOPICS, "names of the topics to record, of any type; relative ones are in the namespace"
+            "topics",
+            DEFAULT_TOPICS,
+            "names of the topics to record, of any type; relative ones are in the namespace and can be remapped, and "
+            "the bag has them under the name that is given here, from the root",
         )
         declare("directory", "out/episodes", "folder of the bags; this node holds it alone")
         declare("depth", 1000, "messages of a topic that wait here when the disk is slow [count]")
@@ -66,7 +69,7 @@ class RecorderNode(ManagedNode):
         self.create_service(Trigger, "~/discard_episode", self._on_discard)
         self._watch = TopicWatch(
             self,
-            [self.resolve_topic_name(topic) for topic in self.get_parameter("topics").value],
+            {self.resolve_topic_name(topic): _recorded(topic) for topic in self.get_parameter("topics").value},
             depth=self._whole("depth"),
             connected=self._recorder.connect,
             received=self._on_message,
@@ -186,6 +189,11 @@ class RecorderNode(ManagedNode):
         stamped = DiagnosticArray(status=[report])
         stamped.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics_topic.publish(stamped)
+
+
+def _recorded(topic: str) -> str:
+    """A topic's name in the bag: the same in every namespace, and whatever it is remapped to."""
+    return topic if topic.startswith(("/", "~")) else f"/{topic}"
 
 
 def main() -> None:

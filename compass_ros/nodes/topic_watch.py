@@ -27,14 +27,16 @@ class TopicWatch:
     def __init__(
         self,
         node: Node,
-        topics: Sequence[str],
+        topics: Mapping[str, str],
         depth: int,
         connected: Callable[[Connection], None],
         received: Received,
     ) -> None:
-        """`connected` is called when a topic is found and when its type changes, before its first message."""
+        """`topics`: where messages are received -> the name under which they are handed on.
+
+        `connected` is called when a topic is found and when its type changes, before its first message."""
         self._node = node
-        self._topics = tuple(topics)
+        self._topics = dict(topics)
         self._depth = depth
         self._connected = connected
         self._received = received
@@ -75,7 +77,7 @@ class TopicWatch:
         kind = min(types)
         offered = [publisher for publisher in publishers if publisher.topic_type == kind]
         definition, message_class = _definition(kind, offered), _class(kind)
-        self._connections[topic] = Connection(topic, definition, qos_yaml(offered))
+        self._connections[topic] = Connection(self._topics[topic], definition, qos_yaml(offered))
         self._connected(self._connections[topic])
         receive = partial(self._receive, topic)
         profile = matching_qos(offered, self._depth)
@@ -83,7 +85,7 @@ class TopicWatch:
 
     def _receive(self, topic: str, data: bytes, info: Mapping[str, int | None]) -> None:
         sequence = info["publication_sequence_number"] if self._publishers[topic] == 1 else None
-        self._received(topic, data, info["source_timestamp"] or 0, sequence)
+        self._received(self._topics[topic], data, info["source_timestamp"] or 0, sequence)
 
 
 def matching_qos(publishers: Sequence[TopicEndpointInfo], depth: int) -> QoSProfile:

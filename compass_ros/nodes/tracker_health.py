@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
@@ -9,6 +10,8 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from compass_ros.tracking.tracker import Frame
+
+_REMEMBERED, _FEW = 60, 5
 
 
 @dataclass
@@ -32,20 +35,21 @@ class Counts:
 
 
 class StampGaps:
-    """Counts images that never came, from the stamps of those that did: the least period seen is the camera's."""
+    """Counts images that never came, from the stamps of those that did. The camera's period is what two fifths of
+    the last gaps keep below: stamps may jitter, and many images may be missing."""
 
     def __init__(self) -> None:
         self._last_ns: int | None = None
-        self._period_ns: int | None = None
+        self._gaps: deque[int] = deque(maxlen=_REMEMBERED)
 
     def take(self, stamp_ns: int) -> int:
         """Images missing before this one."""
         last, self._last_ns = self._last_ns, stamp_ns
         if last is None or stamp_ns <= last:
             return 0
-        gap = stamp_ns - last
-        self._period_ns = gap if self._period_ns is None else min(gap, self._period_ns)
-        return round(gap / self._period_ns) - 1
+        self._gaps.append(stamp_ns - last)
+        period = float(np.quantile(self._gaps, 0.4))
+        return max(round((stamp_ns - last) / period) - 1, 0) if len(self._gaps) > _FEW else 0
 
 
 def health_message(

@@ -25,7 +25,8 @@ journal = Journal(output, json.loads(sys.argv[2]))
 folder = output.parent / ".result-abc"
 folder.mkdir()
 import subprocess
-child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)", str(folder)], stdout=subprocess.DEVNULL, start_new_session=True)
+words = [sys.executable, "-c", "import time; time.sleep(60)", str(folder)]
+child = subprocess.Popen(words, stdout=subprocess.DEVNULL, start_new_session=True)
 journal.begun(child.pid, folder)
 journal.note("calibrate", 7)
 print(child.pid, flush=True)
