@@ -3,6 +3,7 @@
 #   make demo    the main job: a virtual robot cell plays shots, and the calibrator finds what is wrong with the simulator
 #   make test    ruff, mypy, all tests
 #   make prove   120 sealed worlds: conceal, calibrate blindly, unseal, count; goes on where it was stopped
+#   make real    cubes, balls and pendulums that others recorded (docs/real-data.md); the data lie in COMPASS_REAL_DATA
 #   make soak    half an hour of full load: memory, lost messages, latency; ARGS="--minutes 5" for less
 #   make lint | bench | bags | lock | clean
 #
@@ -20,7 +21,7 @@ export MUJOCO_GL ?= disable
 SHARED := $(shell find resource config launch -type f -o -type l)
 NATIVE := $(wildcard compass_ros/simulation/native/*.c)
 
-.PHONY: demo prove test lint bench bags install interfaces lock clean soak
+.PHONY: demo prove real test lint bench bags install interfaces lock clean soak
 .DELETE_ON_ERROR:
 
 demo: install
@@ -43,6 +44,9 @@ bench: install
 # After a change to the air-hockey cell: the shipped bags, recorded anew by the nodes.
 bags: install
 	$(BIN)/python scripts/record_bags.py
+
+real: install
+	$(BIN)/compass real --out out/real $(ARGS)
 
 prove: install
 	$(BIN)/compass prove --worlds 120 --jobs $(JOBS) --out proof/results.jsonl --page docs/proof.md $(ARGS)
