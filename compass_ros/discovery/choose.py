@@ -9,7 +9,7 @@ import numpy as np
 
 from compass_ros.calibration.least_squares import Fit, Point, cost, difference_steps, linearise, minimise
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import ROBUST, calmed
+from compass_ros.calibration.refine import ROBUST, calmed, covariance
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.impulses import impulses
 from compass_ros.discovery.joint import Joint, converge, fit_jointly
@@ -81,11 +81,13 @@ class Choice:
 
 
 def held_out(judge: Likelihood, space: Space) -> HeldOut:
-    """Weigh held-out episodes: frames that the parameters move too much are trusted less, as in the fit."""
+    """Weigh held-out episodes: what the parameters' own uncertainty moves there is added to the noise."""
     point = Point(space.fit.point.values, np.zeros_like(judge.inputs), np.inf)
     free = space.fit.free
     linear = linearise(judge, point, free, difference_steps(space.fit.linear))
-    calm = calmed(judge, linear)
+    known = covariance(space.likelihood, space.fit)[: len(free), : len(free)]
+    uncertain = np.einsum("efcp,pq,efcq->efc", linear.jacobian, known, linear.jacobian)
+    calm = calmed(replace(judge, sigma=judge.sigma * np.sqrt(1 + uncertain)), linear)
     floor = noise_cost(calm, replace(space.fit, free=np.zeros(0, dtype=np.int64)))
     return HeldOut(calm, held_out_cost(calm, point.values), floor)
 
