@@ -210,8 +210,8 @@ def test_every_parameter_says_what_it_is(start_node: StartNode, probe: Probe) ->
     listed = probe.call(ListParameters, "/calibrator/list_parameters").result.names
     own = [name for name in listed if name != "use_sim_time" and "start_type_description" not in name]
     assert sorted(own) == [
-        "autostart", "bags", "calibrate_at_start", "cell", "false_alarm", "method", "output", "resume", "rollouts",
-        "running_check", "seed", "versions",
+        "autostart", "bags", "calibrate_at_start", "cell", "false_alarm", "method", "newest", "output", "resume",
+        "rollouts", "running_check", "seed", "versions",
     ]  # fmt: skip
     request = DescribeParameters.Request(names=own)
     described = probe.call(DescribeParameters, "/calibrator/describe_parameters", request).descriptors
