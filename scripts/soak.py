@@ -40,6 +40,8 @@ from compass_ros.nodes.images import stamp_ns
 
 ROOT = Path(__file__).parents[1]
 EPISODE_S, SAMPLE_S, WARM_UP_S = 10.0, 2.0, 20.0
+PATIENCE_S = 120.0
+"""An answer that takes longer will not come [s]."""
 LATENCY_P99_MS, GROWTH_MIB_PER_HOUR = 20.0, 30.0
 ARM = "/arm/pose"
 TRACKED = [f"/puck_tracker/{name}/pose" for name in ("puck1", "puck2", "pusher")]
@@ -94,7 +96,7 @@ def processes(folder: Path) -> Iterator[Mapping[str, subprocess.Popen[str]]]:
         for process in running.values():
             process.send_signal(signal.SIGINT)
         for process in running.values():
-            process.wait(30)
+            process.wait(PATIENCE_S)
 
 
 class Watcher:
@@ -139,10 +141,10 @@ class Watcher:
         self._heard.said += [answer.message] if answer.message else []
 
     def _call(self, client: Any, request: Any) -> Any:
-        if not client.wait_for_service(30):
+        if not client.wait_for_service(PATIENCE_S):
             raise SystemExit(f"soak: no service {client.srv_name}")
         future = client.call_async(request)
-        rclpy.spin_until_future_complete(self.node, future, timeout_sec=30)
+        rclpy.spin_until_future_complete(self.node, future, timeout_sec=PATIENCE_S)
         if future.result() is None or not future.result().success:
             raise SystemExit(f"soak: {client.srv_name}: {future.result()}")
         return future.result()
