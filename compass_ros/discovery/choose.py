@@ -104,9 +104,8 @@ def noise_cost(likelihood: Likelihood, fit: Fit) -> float:
     grid = np.linspace(-6, 6, 2001)
     density = np.exp(-0.5 * grid**2) / np.sqrt(2 * np.pi)
     loss = fit.robust**2 * (np.sqrt(1 + (grid / fit.robust) ** 2) - 1)
-    quiet = (
-        np.nanmedian(likelihood.sigma) ** 2 / likelihood.sigma**2
-    )  # frames that roughness makes uncertain are quieter
+    noise = likelihood.sigma.min(axis=(0, 1))  # before any collision there is nothing but the tracker's noise
+    quiet = noise**2 / likelihood.sigma**2  # where sigma holds more than noise, noise is quieter than one sigma
     of_noise = float(np.sum(density * loss) * (grid[1] - grid[0]))
     measured = ~np.isnan(likelihood.measured)
     return of_noise * float(np.sum(np.broadcast_to(quiet, measured.shape)[measured])) - 0.5 * len(fit.free)
