@@ -57,7 +57,7 @@ def test_impacts_begin_in_free_flight(some_tosses: Path, tmp_path: Path) -> None
 def test_the_state_of_a_flight() -> None:
     time = np.arange(5) / RATE_HZ
     turned = Rotation.from_rotvec([0.3, -0.2, 0.1]) * Rotation.from_rotvec(np.outer(time, [2.0, -3.0, 1.0]))
-    places = np.array([0.1, -0.2, 0.3]) + np.outer(time, [1.0, 0.5, -2.0]) - np.outer(time**2, [0, 0, 9.81 / 2])
+    places: Floats = np.array([0.1, -0.2, 0.3]) + np.outer(time, [1.0, 0.5, -2.0]) - np.outer(time**2, [0, 0, 9.81 / 2])
     state = _flight_state(np.hstack([places, turned.as_quat()[:, [3, 0, 1, 2]]]))
     np.testing.assert_allclose(state[:3], [0.1, -0.2, 0.3], atol=1e-12)
     np.testing.assert_allclose(state[7:], [1.0, 0.5, -2.0, 2.0, -3.0, 1.0], atol=1e-9)
