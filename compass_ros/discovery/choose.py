@@ -118,21 +118,28 @@ def choose(space: Space, scores: Sequence[Score], candidates: Sequence[Candidate
     singles: list[Joint] = []
     for promising in _rounds(scores):
         tried = [fit_jointly(space, [s], 4, tolerance=2.0) for s in promising]
-        tried.sort(key=lambda j: j.fit.point.cost)
-        tried = [further(j) if j.fit.point.cost < 0.5 * (base + tried[0].fit.point.cost) else j for j in tried]
-        singles = sorted([*singles, *tried], key=lambda j: j.fit.point.cost + unseen.cost(j))
+        best = min((j.fit.point.cost for j in tried), default=base)
+        tried = [further(j) if j.fit.point.cost < 0.5 * (base + best) else j for j in tried]
+        singles = sorted([*singles, *tried], key=_worth)
+        singles = sorted([*(converge(j) for j in singles[:2]), *singles[2:]], key=_worth)
         if not singles:
             break
-        singles[0] = converge(singles[0])
-        floor = min(floor, singles[0].fit.point.cost)
+        floor = min(floor, *(j.fit.point.cost for j in singles))
         choice = Choice(tuple(singles), None, base - floor, floor)
-        if choice.enough(singles[0]) and unseen.helps(singles[0]):
-            return choice
+        good = [j for j in singles if choice.enough(j) and unseen.helps(j)]
+        if good:
+            others = [j for j in singles if j is not good[0]]
+            return Choice((good[0], *others), None, base - floor, floor)
     if not singles:
         return Choice((), None, base - floor, floor)
-    pair = _second(space, singles[0], singles, candidates, unseen)
+    pair = _second(singles[0], singles, candidates)
     floor = min(floor, pair.fit.point.cost) if pair else floor
     return Choice(tuple(singles), pair, base - floor, floor)
+
+
+def _worth(joint: Joint) -> float:
+    """Order of models: what they leave, and what their numbers cost (Laplace); smaller is better."""
+    return -joint.log_evidence(joint.likelihood.correlation_time)
 
 
 def further(joint: Joint) -> Joint:
@@ -171,9 +178,7 @@ def _promising(scores: Sequence[Score]) -> list[Score]:
     return out
 
 
-def _second(
-    space: Space, best: Joint, singles: Sequence[Joint], candidates: Sequence[Candidate], unseen: HeldOut
-) -> Joint | None:
+def _second(best: Joint, singles: Sequence[Joint], candidates: Sequence[Candidate]) -> Joint | None:
     """The best single effects, each with the candidate that explains most of what it leaves."""
     found: list[Joint] = []
     for first in _different(singles)[:2]:
@@ -185,7 +190,7 @@ def _second(
         for s in _promising(scores)[:2]:
             joint = fit_jointly(there, [s], 8)
             found.append(Joint(joint.simulator, joint.likelihood, joint.fit, (*first.added, *joint.added)))
-    found.sort(key=lambda j: j.fit.point.cost + unseen.cost(j))
+    found.sort(key=_worth)
     return converge(found[0]) if found else None
 
 

@@ -267,17 +267,14 @@ class Finding:
         )
 
     def _equals(self, best: Joint, choice: Choice, unseen: HeldOut) -> tuple[Joint, ...]:
-        """Other effects that explain all recordings as well: within EQUAL of log evidence, or of the gain's share."""
+        """Other effects that explain the recordings as well: within EQUAL of log evidence, or of the gain's share."""
         kappa = self.noise.correlation_time
 
-        def evidence(joint: Joint) -> float:
-            return joint.log_evidence(kappa) - unseen.cost(joint) / kappa
-
-        top = evidence(best)
+        top = best.log_evidence(kappa)
         margin = max(EQUAL, EQUAL_SHARE * choice.excess / kappa)
         seen, out = {best.name}, []
         for joint in choice.singles[1:]:
-            if joint.name not in seen and top - evidence(joint) < margin:
+            if joint.name not in seen and top - joint.log_evidence(kappa) < margin and unseen.helps(joint):
                 out.append(joint)
             seen.add(joint.name)
         return tuple(out)
