@@ -37,6 +37,9 @@ ROBUST = 4.0
 CALM = 300.0
 """Movement of a frame by one prior width [sigma] above which it is trusted less; ordinary shots stay below."""
 
+SMALL = 0.3
+"""Size of the changes that show the simulator's roughness, in steps of the differences: curvature must not count."""
+
 Watch = Callable[[str, float, Point], bool]
 """(stage, share of the refinement done, where it stands) -> whether to go on."""
 
@@ -177,7 +180,7 @@ def with_roughness(likelihood: Likelihood, fit: Fit, draws: int = 6) -> Likeliho
     rng = np.random.default_rng(0)
     free, episodes = fit.free, len(likelihood.inputs)
     steps = difference_steps(fit.linear)
-    moves = rng.choice([-1.0, 1.0], (draws, len(free))) * steps / np.sqrt(len(free))
+    moves = SMALL * rng.choice([-1.0, 1.0], (draws, len(free))) * steps / np.sqrt(len(free))
     values = np.tile(fit.point.values, (draws, 1))
     values[:, free] += moves * likelihood.prior_std[free]
     values = np.clip(values, likelihood.low, likelihood.high)
