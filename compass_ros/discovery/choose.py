@@ -15,14 +15,15 @@ from compass_ros.discovery.impulses import impulses
 from compass_ros.discovery.joint import Joint, converge, fit_jointly
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import score
-from compass_ros.types import Floats
 
 ENOUGH = 0.93
 """Share of the excess (cost above the noise floor) that a single effect must explain to be named alone."""
 PAIR_ENOUGH = 0.95
 """The same for two effects."""
 SMALL = 0.12
-"""Excess of chi-square under which a remainder is put down to the effect's functional form."""
+"""Excess of chi-square under which a remainder is put down to the effect's functional form..."""
+FORM_SHARE = 0.85
+"""...if the effect explains at least this share."""
 NEEDED = 0.04
 """Share of the excess that each effect of a pair must be worth."""
 TRIED = 6
@@ -41,18 +42,17 @@ class HeldOut:
 
     likelihood: Likelihood
     before: float
-    """Cost of the model without effects."""
+    """Surprise by the model without effects."""
     floor: float
-    """Cost that noise leaves."""
+    """Surprise by noise alone."""
 
-    def cost(self, joint: Joint) -> float:
-        """Cost of a fitted model."""
-        predicted = replace(self.likelihood, predict=joint.simulator.observe)
-        return held_out_cost(predicted, joint.fit.point.values)
+    def surprise(self, joint: Joint) -> float:
+        """Minus the log predictive density of a fitted model."""
+        return surprise(self.likelihood, joint.likelihood, joint.fit)
 
     def helps(self, joint: Joint) -> bool:
         """Whether a model predicts these episodes better: clearly, where there is something to gain."""
-        excess, gain = self.before - self.floor, self.before - self.cost(joint)
+        excess, gain = self.before - self.floor, self.before - self.surprise(joint)
         return gain > HELD_OUT_SHARE * excess if excess > HELD_OUT_SEEN else gain > -5.0
 
 
@@ -77,26 +77,41 @@ class Choice:
 
     def enough(self, joint: Joint) -> bool:
         """Whether a model explains what there is to explain."""
-        return self.share(joint) >= (ENOUGH if len(joint.added) == 1 else PAIR_ENOUGH) or self.remainder(joint) < SMALL
+        share = self.share(joint)
+        form_only = share >= FORM_SHARE and self.remainder(joint) < SMALL
+        return share >= (ENOUGH if len(joint.added) == 1 else PAIR_ENOUGH) or form_only
 
 
 def held_out(judge: Likelihood, space: Space) -> HeldOut:
-    """Weigh held-out episodes: what the parameters' own uncertainty moves there is added to the noise."""
+    """Weigh held-out episodes: frames that the parameters move too much are trusted less, as in the fit."""
     point = Point(space.fit.point.values, np.zeros_like(judge.inputs), np.inf)
-    free = space.fit.free
-    linear = linearise(judge, point, free, difference_steps(space.fit.linear))
-    known = covariance(space.likelihood, space.fit)[: len(free), : len(free)]
-    uncertain = np.einsum("efcp,pq,efcq->efc", linear.jacobian, known, linear.jacobian)
-    calm = calmed(replace(judge, sigma=judge.sigma * np.sqrt(1 + uncertain)), linear)
+    linear = linearise(judge, point, space.fit.free, difference_steps(space.fit.linear))
+    calm = calmed(judge, linear)
     floor = noise_cost(calm, replace(space.fit, free=np.zeros(0, dtype=np.int64)))
-    return HeldOut(calm, held_out_cost(calm, point.values), floor)
+    return HeldOut(calm, surprise(calm, space.likelihood, space.fit), floor)
 
 
-def held_out_cost(likelihood: Likelihood, values: Floats) -> float:
-    """Robust cost without the prior's part."""
-    tiled = np.tile(values, (len(likelihood.inputs), 1))
-    residual = likelihood.residual(tiled, likelihood.inputs, np.arange(len(tiled)))
-    return float(np.sum(residual**2 / (np.sqrt(1 + (residual / ROBUST) ** 2) + 1)))
+def surprise(unseen: Likelihood, fitted: Likelihood, fit: Fit) -> float:
+    """Minus the log predictive density of unseen episodes, up to a constant: noise and the fit's own uncertainty.
+
+    A model that is unsure what its parameters are may be wrong about an episode without being refuted by it: the
+    residual has the covariance 1 + J C J', C that of the fitted parameters. Outliers are weighed down as in the fit.
+    """
+    judged = replace(fitted, inputs=unseen.inputs, time_s=unseen.time_s, measured=unseen.measured, sigma=unseen.sigma)
+    point = Point(fit.point.values, np.zeros_like(unseen.inputs), np.inf)
+    linear = linearise(judged, point, fit.free, difference_steps(fit.linear))
+    residual, jacobian = linear.residual.ravel(), linear.jacobian.reshape(-1, len(fit.free))
+    known = covariance(fitted, fit)[: len(fit.free), : len(fit.free)]
+    precision = np.linalg.inv(known)
+    left, weight = residual, np.ones_like(residual)
+    for _ in range(3):
+        weight = 1 / np.sqrt(1 + (left / ROBUST) ** 2)
+        inner = precision + (jacobian * weight[:, None]).T @ jacobian
+        move = -np.linalg.solve(inner, jacobian.T @ (weight * residual))
+        left = residual + jacobian @ move
+    loss = float(np.sum(left**2 / (np.sqrt(1 + (left / ROBUST) ** 2) + 1)))
+    volume = np.linalg.slogdet(inner)[1] - np.linalg.slogdet(precision)[1]
+    return loss + 0.5 * float(move @ precision @ move) + 0.5 * float(volume)
 
 
 def noise_cost(likelihood: Likelihood, fit: Fit) -> float:
@@ -126,7 +141,8 @@ def choose(space: Space, scores: Sequence[Score], candidates: Sequence[Candidate
             break
         floor = min(floor, *(j.fit.point.cost for j in singles))
         choice = Choice(tuple(singles), None, base - floor, floor)
-        good = [j for j in singles if choice.enough(j) and unseen.helps(j)]
+        good = [j for j in singles[:4] if choice.enough(j) and unseen.helps(j)]
+        good.sort(key=lambda j: -evidence(j, unseen))
         if good:
             others = [j for j in singles if j is not good[0]]
             return Choice((good[0], *others), None, base - floor, floor)
@@ -140,6 +156,11 @@ def choose(space: Space, scores: Sequence[Score], candidates: Sequence[Candidate
 def _worth(joint: Joint) -> float:
     """Order of models: what they leave, and what their numbers cost (Laplace); smaller is better."""
     return -joint.log_evidence(joint.likelihood.correlation_time)
+
+
+def evidence(joint: Joint, unseen: HeldOut) -> float:
+    """Log evidence of all episodes: of the fitted ones, and of the others as they are predicted."""
+    return -_worth(joint) - unseen.surprise(joint) / joint.likelihood.correlation_time
 
 
 def further(joint: Joint) -> Joint:

@@ -12,7 +12,7 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import Refined, covariance, polish
 from compass_ros.discovery.candidates import Candidate, candidates
-from compass_ros.discovery.choose import NEEDED, Choice, HeldOut, choose, held_out, noise_cost
+from compass_ros.discovery.choose import NEEDED, Choice, HeldOut, choose, evidence, held_out, noise_cost
 from compass_ros.discovery.formula import Proposal, propose
 from compass_ros.discovery.impulses import impulses
 from compass_ros.discovery.information import information
@@ -270,11 +270,11 @@ class Finding:
         """Other effects that explain the recordings as well: within EQUAL of log evidence, or of the gain's share."""
         kappa = self.noise.correlation_time
 
-        top = best.log_evidence(kappa)
+        top = evidence(best, unseen)
         margin = max(EQUAL, EQUAL_SHARE * choice.excess / kappa)
         seen, out = {best.name}, []
         for joint in choice.singles[1:]:
-            if joint.name not in seen and top - joint.log_evidence(kappa) < margin and unseen.helps(joint):
+            if joint.name not in seen and top - evidence(joint, unseen) < margin and unseen.helps(joint):
                 out.append(joint)
             seen.add(joint.name)
         return tuple(out)
