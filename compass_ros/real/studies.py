@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 from compass_ros.errors import ConfigError, nearest
@@ -21,9 +22,13 @@ STUDIES: Mapping[str, Run] = {
 }
 
 
-def chosen(names: list[str]) -> dict[str, Run]:
-    """The studies of these names, all where there is none. Raises ConfigError with the nearest known name."""
+def chosen(names: list[str], evaluations: int = 0) -> dict[str, Run]:
+    """The studies of these names, all where there is none. Raises ConfigError with the nearest known name.
+
+    `evaluations`: of a new search for the cube; 0: its recorded numbers.
+    """
     for name in names:
         if name not in STUDIES:
             raise ConfigError(f"unknown study '{name}'; known: {', '.join(STUDIES)}{nearest(name, STUDIES)}")
-    return {name: STUDIES[name] for name in names or STUDIES}
+    searched = {"cube_tosses": partial(cube_tosses.study, evaluations=evaluations)} if evaluations else {}
+    return {name: searched.get(name, STUDIES[name]) for name in names or STUDIES}
