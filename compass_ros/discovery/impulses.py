@@ -59,28 +59,24 @@ class Impulses:
 
 
 def impulses(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> Impulses:
-    """Roll out unit pushes around a fit of the plain simulator."""
+    """Roll out unit pushes around a fit of a simulator, with the effects that it has."""
     movers = simulator.movers()
     episodes, duration = len(likelihood.inputs), float(likelihood.time_s.max())
     half = duration / MOMENTS
     moments = half * (np.arange(MOMENTS) + 0.5)
-    pushed = simulator.with_effects([Attached(_PUSH, (name,)) for name in movers])
-    cell = len(simulator.cell.parameters)
+    pushed = simulator.with_effects([*simulator.effects, *(Attached(_PUSH, (name,)) for name in movers)])
+    known = len(fit.point.values)
     cases = [(k, n, a) for k in range(MOMENTS) for n in range(len(movers)) for a in range(2)]
-    values = np.tile(
-        np.concatenate([fit.point.values[:cell], np.tile([0.0, 0.0, 0.0, half], len(movers))]), (len(cases), 1)
-    )
+    values = np.tile(np.concatenate([fit.point.values, np.tile([0.0, 0.0, 0.0, half], len(movers))]), (len(cases), 1))
     size = SPEED_CHANGE / half
     for row, (k, n, a) in zip(values, cases, strict=True):
-        row[cell + 4 * n + a] = size
-        row[cell + 4 * n + 2] = moments[k]
+        row[known + 4 * n + a] = size
+        row[known + 4 * n + 2] = moments[k]
     inputs = likelihood.inputs + fit.point.launch
     index = np.tile(np.arange(episodes), len(cases))
     predicted = pushed.observe(np.repeat(values, episodes, axis=0), inputs[index], likelihood.time_s[index])
     there = np.nan_to_num((predicted - likelihood.measured[index]) / likelihood.sigma[index])
     change = (there.reshape(len(cases), episodes, -1) - fit.linear.residual.reshape(episodes, -1)) / size
-    base = np.tile(fit.point.values[:cell], (episodes, 1))
+    base = np.tile(fit.point.values, (episodes, 1))
     paths = simulator.paths(base, inputs, moments, movers)
-    return Impulses(
-        movers, moments, paths, simulator.masses(fit.point.values[:cell], movers), np.moveaxis(change, 0, -1)
-    )
+    return Impulses(movers, moments, paths, simulator.masses(fit.point.values, movers), np.moveaxis(change, 0, -1))
