@@ -255,7 +255,7 @@ def _step(likelihood: Likelihood, point: Point, free: Ints, hessian: Floats, gra
         held[outside] = True
     move[:p] = np.clip(move[:p], low, high)
     values = point.values.copy()
-    values[free] += scale * move[:p]
+    values[free] = np.clip(values[free] + scale * move[:p], likelihood.low[free], likelihood.high[free])
     launch = point.launch.copy()
     random = likelihood.launch_std > 0
     launch[:, random] += move[p:].reshape(len(launch), -1) * likelihood.launch_std[random]

@@ -22,9 +22,9 @@ PAIR_ENOUGH = 0.95
 """The same for two effects."""
 SMALL = 0.12
 """Excess of chi-square under which a remainder is put down to the effect's functional form..."""
-FORM_SHARE = 0.85
+FORM_SHARE = 0.6
 """...if the effect explains at least this share."""
-NEEDED = 0.04
+NEEDED = 0.1
 """Share of the excess that each effect of a pair must be worth."""
 TRIED = 6
 """Names that are fitted at once, the most promising first; as many again where none of them is enough."""
