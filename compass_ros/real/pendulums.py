@@ -24,6 +24,8 @@ from compass_ros.types import Episode, Floats
 EVERY = 10
 """Of the frames at 1 kHz, each tenth is compared."""
 MRAD = 1e3
+CLEAR = 5.0
+"""Log evidence by which a law must win to be preferred: the joint errors of pieces of one swing are not modelled."""
 
 STRIBECK = replace(
     effect("stribeck_friction"),
@@ -130,12 +132,17 @@ def study(name: str, laws: Sequence[Law], piece_s: float, out: Path, data: Path 
         fitted = fit(Simulator(cell, one.effects), cut, one.unknowns, True, one.fixed)
         found.append(fitted)
         rows.append(_row(one, fitted, found[0], cell, unseen))
-    best = int(np.argmax([gain(f, found[0]) for f in found]))
+    evidence = [gain(f, found[0]) for f in found]  # of the fitted pieces alone: validation does not choose
+    best = int(np.argmax(evidence))
+    rivals = [
+        one.name for one, e in zip(laws, evidence, strict=True) if evidence[best] - e < CLEAR and one is not laws[best]
+    ]
     columns: tuple[str, ...] = ("friction", f"fitted pieces of {piece_s:g} s", "log evidence over viscous")
     columns += ("validation, first state as stated", "from the first 20 ms", "first state free", "coefficients")
     title = f"{name}: rms on the validation swings [mrad]"
     sentence = f"The swings prefer {laws[best].name}: {_coefficients(laws[best], found[best])}."
-    return Study(name, (sentence,), (Table(title, columns, tuple(rows)),))
+    told = f"Not told apart from it by the fitted pieces: {', '.join(rivals) or 'nothing else that was tried'}."
+    return Study(name, (sentence, told), (Table(title, columns, tuple(rows)),))
 
 
 def pieces(cell: Cell, episode: Episode, seconds: float) -> list[Episode]:
