@@ -20,6 +20,7 @@ from compass_ros.discovery.joint import Joint
 from compass_ros.discovery.maps import TableMap, residual_map
 from compass_ros.discovery.next_shot import next_experiment
 from compass_ros.discovery.null import Null, simulate_null
+from compass_ros.discovery.numerics import numerical_cause
 from compass_ros.discovery.plan import objections, plan_of
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import score
@@ -115,6 +116,9 @@ def discover(
     found = Finding(simulator, refined, judge, noise, null, undetectable, before, seed, warnings)
     if not _something(space, scores, null, noise):
         return found.none(scores)
+    cause = numerical_cause(space, refined.fit.point.cost - noise_cost(space.likelihood, space.fit))
+    if cause:
+        return found.failed(f"No verdict: {cause}. That is the simulator's numerics, not physics.")
     tell("fit effects", 0.4)
     unseen = held_out(judge, space)
     choice = choose(space, scores, asked, unseen)
@@ -189,6 +193,11 @@ class Finding:
         mismatch = Mismatch("none", None, (), self.undetectable, "", sentence)
         return Discovery(mismatch, tried=tried, before=self.before, warnings=self.warnings)
 
+    def failed(self, sentence: str) -> Discovery:
+        """Something is left, and it is no evidence of physics."""
+        mismatch = Mismatch("fit_failed", None, (), self.undetectable, "", sentence)
+        return Discovery(mismatch, before=self.before, warnings=self.warnings)
+
     def judged(self, space: Space, choice: Choice, unseen: HeldOut) -> Discovery:
         """Named, ambiguous, unknown or failed."""
         best = choice.singles[0] if choice.singles else None
@@ -234,9 +243,7 @@ class Finding:
         """Something is there that no known effect explains; a formula is proposed where one predicts."""
         where, sure = whereabouts(space, choice)
         if not sure and not choice.singles:
-            sentence = "The fit did not reach the noise floor and no place stands out: no verdict."
-            mismatch = Mismatch("fit_failed", where, (), self.undetectable, "", sentence)
-            return Discovery(mismatch, before=self.before, warnings=self.warnings)
+            return self.failed("No verdict: the fit did not reach the noise floor and no place stands out.")
         proposal: Proposal | None = propose(space, self.judge)
         sentence = f"{place(where)}, something differs that no known effect explains"
         if choice.singles:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
+from rich import box
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -23,6 +25,10 @@ from compass_ros.reporting.words import (
 from compass_ros.types import ParameterRow, Result
 
 STYLE: Mapping[Level, str] = {"good": "bold green", "note": "dim", "care": "bold yellow", "bad": "bold red"}
+
+
+# Every name of the cells fits into 80 columns.
+NARROW: Mapping[str, Any] = {"box": box.MINIMAL_HEAVY_HEAD, "pad_edge": False}
 
 
 def print_result(result: Result, truth: Mapping[str, float] | None = None, console: Console | None = None) -> None:
@@ -50,7 +56,7 @@ def parameter_table(result: Result, truth: Mapping[str, float]) -> Table:
     shown = [row for row in result.parameters if row.active or truth.get(row.name, row.default) != row.default]
     hidden = len(result.parameters) - len(shown)
     caption = Text(f"{hidden} further parameters have no edge and keep their defaults" if hidden else "", "dim")
-    table = Table(caption=caption, caption_justify="left")
+    table = Table(caption=caption, caption_justify="left", **NARROW)
     table.add_column("parameter", overflow="fold")
     table.add_column("default", justify="right")
     table.add_column("found", justify="right")
@@ -75,7 +81,7 @@ def _found(row: ParameterRow) -> Text:
 def gap_table(result: Result) -> Table:
     """Root mean square distance of each model, and its ratio to the nominal one and to the noise floor."""
     floor = result.noise_floor_m
-    table = Table(caption=Text(f"noise floor {millimetres(floor)} mm", "dim"), caption_justify="left")
+    table = Table(caption=Text(f"noise floor {millimetres(floor)} mm", "dim"), caption_justify="left", **NARROW)
     for heading in ("simulator", "held out [mm]", "of nominal", "of floor", "fitted [mm]"):
         table.add_column(Text(heading), justify="left" if heading == "simulator" else "right")
     nominal = held_out_rmse(result, "nominal")

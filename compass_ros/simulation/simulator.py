@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -59,12 +59,17 @@ class Simulator:
     state. Raises ConfigError where an effect cannot act on the scene.
     """
 
-    def __init__(self, cell: Cell, effects: Sequence[Attached] = (), threads: int = 0) -> None:
+    def __init__(
+        self, cell: Cell, effects: Sequence[Attached] = (), threads: int = 0, options: Mapping[str, float] | None = None
+    ) -> None:
+        """`options`: MuJoCo's numerics (`timestep`, `cone`, `solver`, ...) where they are not to be the scene's."""
         self.cell = cell
         self.effects = tuple(effects)
         self.threads = threads or len(os.sched_getaffinity(0))
         self._dynamics: Dynamics = dynamics_of(cell)
         self._model = self._dynamics.model
+        for name, value in (options or {}).items():
+            setattr(self._model.opt, name, value)
         self._models = [copy.copy(self._model)]
         self._data = [mujoco.MjData(self._model) for _ in range(self.threads)]
         self._pool = Rollout(nthread=self.threads)
@@ -104,6 +109,11 @@ class Simulator:
     @property
     def time_step(self) -> float:
         return float(self._model.opt.timestep)
+
+    @property
+    def options(self) -> mujoco.MjOption:
+        """MuJoCo's numerics of this simulator; not to be changed."""
+        return self._model.opt
 
     @property
     def actuated(self) -> bool:

@@ -24,7 +24,7 @@ def printed(result: Result, truth: dict[str, float] | None = None, width: int = 
 def line(text: str, name: str) -> list[str]:
     """The cells of the first row that holds `name`."""
     found = next(row for row in text.splitlines() if name in row)
-    return [cell.strip() for cell in found.strip()[1:-1].split("│")]
+    return [cell.strip() for cell in found.split("│")]
 
 
 def test_parameters_gap_and_verdict(result: Result, extras: ReportExtras) -> None:
@@ -37,6 +37,11 @@ def test_parameters_gap_and_verdict(result: Result, extras: ReportExtras) -> Non
     assert result.mismatch.sentence in " ".join(text.split())
     assert "54 further parameters" in text
     assert "held out [mm]" in text
+
+
+def test_eighty_columns_hold_every_name(result: Result, extras: ReportExtras) -> None:
+    text = printed(result, dict(extras.truth), width=80)
+    assert all(row.name in text for row in result.parameters if row.active)
 
 
 def test_without_truth_there_is_no_column_for_it(result: Result) -> None:

@@ -1,0 +1,58 @@
+"""Is what is left physics, or does it go away with another time step, friction cone or solver?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import mujoco
+import numpy as np
+
+from compass_ros.discovery.screen import Space
+from compass_ros.simulation import Simulator
+from compass_ros.types import Floats
+
+MOSTLY = 0.5
+"""Share of the excess from which it is put down to numerics."""
+
+
+def numerical_cause(space: Space, excess: float) -> str:
+    """What a change of the simulator's numerics explains of `excess` [log likelihood], as a sentence; else empty.
+
+    The calibrated simulator plays the fitted episodes again with other numerics. What that moves, less what the
+    parameters could take, is taken as it is, with amplitude one: physics has no business in it.
+    """
+    for what, options in _others(space.simulator):
+        share = _gain(space, options) / max(excess, 1e-9)
+        if share > MOSTLY:
+            return f"{100 * min(share, 1.0):.0f} % of what is left goes away with {what}"
+    return ""
+
+
+def _others(simulator: Simulator) -> Iterator[tuple[str, Mapping[str, float]]]:
+    option = simulator.options
+    yield f"half the time step ({500 * option.timestep:g} ms)", {"timestep": 0.5 * option.timestep}
+    pyramid, cone = mujoco.mjtCone.mjCONE_PYRAMIDAL, mujoco.mjtCone.mjCONE_ELLIPTIC
+    if option.cone == pyramid:
+        yield "an elliptic friction cone", {"cone": int(cone)}
+    else:
+        yield "a pyramidal friction cone", {"cone": int(pyramid)}
+    newton, gradient = mujoco.mjtSolver.mjSOL_NEWTON, mujoco.mjtSolver.mjSOL_CG
+    if option.solver == newton:
+        yield "the conjugate-gradient solver", {"solver": int(gradient)}
+    else:
+        yield "Newton's solver", {"solver": int(newton)}
+
+
+def _gain(space: Space, options: Mapping[str, float]) -> float:
+    """Fall of the cost with other numerics, after the parameters have adapted to first order."""
+    likelihood, fit = space.likelihood, space.fit
+    simulator = space.simulator
+    other = Simulator(simulator.cell, simulator.effects, simulator.threads, options)
+    values = np.tile(fit.point.values, (len(likelihood.inputs), 1))
+    inputs = likelihood.inputs + fit.point.launch
+    moved = other.observe(values, inputs, likelihood.time_s) - simulator.observe(values, inputs, likelihood.time_s)
+    weighted = np.nan_to_num(moved / likelihood.sigma).reshape(space.weight.shape) * space.weight
+    seen = ~np.isnan(likelihood.measured).reshape(space.weight.shape)
+    change: Floats = np.where(seen, weighted, 0.0).reshape(-1, 1)
+    matrix, pull = space.reduced_tangent(change)
+    return -float(pull[0] + 0.5 * matrix[0, 0])
