@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from compass_ros.types import Floats
 
@@ -14,6 +15,13 @@ _WORSE = 1.25
 """Flight noise over noise at rest from which motion counts as a source of noise (blur, stamps)."""
 _WINDOW = 7
 """Frames of the local parabola that takes the motion out of a flight."""
+_OWN = 0.5
+"""Freedom of a window: neighbours share frames, and what the parabola takes from them."""
+_CORRELATIONS = np.linspace(0.0, 0.95, 39)
+_FOLLOWS = 0.2
+"""Correlation from which flight says too little noise."""
+_ALIKE = 0.99
+"""Level of the test that the columns have one noise."""
 
 
 @dataclass(frozen=True)
@@ -43,21 +51,49 @@ def measure_noise(time_s: Floats, measured: Floats, expected: float, stated: Flo
 
 def _measured_noise(time_s: Floats, measured: Floats, expected: float) -> Noise:
     still = _still_residuals(time_s, measured)
-    flight = _flight_sigma(measured)
-    columns = measured.shape[2]
     if still is None:
+        flight, _ = _flight_noise(measured)
         return Noise(np.where(np.isnan(flight), expected, flight), 0.0)
-    at_rest = np.sqrt(np.nanmean(np.square(_clipped(still)), axis=(0, 1))) * _small_sample(still)
+    at_rest, correlation = _at_rest(still)
+    repeated = (1 + correlation) / (1 - correlation)
+    flight, of_flight = _flight_noise(np.where(time_s[:, :, None] < 0, np.nan, measured))
+    if correlation > _FOLLOWS:
+        of_flight = np.zeros_like(of_flight)
+    of_rest = (np.sum(~np.isnan(still), axis=(0, 1)) - len(still)) / repeated
+    both = np.sqrt((of_rest * at_rest**2 + of_flight * np.nan_to_num(flight) ** 2) / (of_rest + of_flight))
     moving_is_worse = np.nan_to_num(flight) > _WORSE * at_rest
-    sigma = np.where(moving_is_worse, flight, at_rest)
-    clipped = np.clip(still, -3 * at_rest, 3 * at_rest)
+    sigma = np.where(moving_is_worse, flight, both)
+    sigma = _pooled(np.maximum(sigma, 1e-6), np.where(moving_is_worse, of_flight, of_rest + of_flight))
+    return Noise(sigma, correlation)
+
+
+def _at_rest(still: Floats) -> tuple[Floats, float]:
+    """(C,) standard deviation, and correlation of neighbours, of an AR(1) process seen less each episode's mean.
+
+    Taking out the mean of n frames lowers both. What they come to is known exactly, so that it can be undone.
+    """
+    frames = max(round(float(np.mean(np.sum(~np.isnan(still[:, :, 0]), axis=1)))), 3)
+    spread = np.sqrt(np.nanmean(np.square(_clipped(still)), axis=(0, 1)))
+    clipped = np.clip(still, -3 * spread, 3 * spread)
     both = ~np.isnan(clipped[:, 1:]) & ~np.isnan(clipped[:, :-1])
     products = np.where(both, clipped[:, 1:] * clipped[:, :-1], 0).sum() / max(both.sum(), 1)
-    correlation = float(products / max(np.nanmean(clipped**2), 1e-300))
-    bias = 1.0 / max(np.sum(~np.isnan(still), axis=1).max(), 1)  # taking out each episode's mean lowers it by about 1/n
-    return Noise(
-        np.broadcast_to(np.maximum(sigma, 1e-6), (columns,)).copy(), float(np.clip(correlation + bias, 0.0, 0.95))
-    )
+    found = products / max(float(np.nanmean(clipped**2)), 1e-300)
+    apart = np.abs(np.subtract.outer(np.arange(frames), np.arange(frames)))
+    centre = np.eye(frames) - 1 / frames
+    left = [centre @ rho**apart @ centre for rho in _CORRELATIONS]
+    variances = np.array([np.mean(np.diag(c)) for c in left])
+    neighbours = np.array([np.mean(np.diag(c, 1)) for c in left]) / variances
+    correlation = float(np.interp(found, neighbours, _CORRELATIONS))
+    return spread / np.sqrt(np.interp(correlation, _CORRELATIONS, variances)), correlation
+
+
+def _pooled(sigma: Floats, freedom: Floats) -> Floats:
+    """(C,) one value for all columns where Bartlett's test (1937) does not tell them apart."""
+    total = float(np.sum(freedom))
+    common = float(np.sum(freedom * sigma**2) / total)
+    statistic = total * np.log(common) - float(np.sum(freedom * np.log(sigma**2)))
+    alike = statistic < chi2.ppf(_ALIKE, max(len(sigma) - 1, 1))
+    return np.full(len(sigma), np.sqrt(common)) if alike else sigma
 
 
 def _still_residuals(time_s: Floats, measured: Floats) -> Floats | None:
@@ -75,25 +111,33 @@ def _clipped(still: Floats) -> Floats:
     return np.asarray(np.clip(still, -limit, limit))
 
 
-def _small_sample(still: Floats) -> float:
-    """Undo what taking out the means costs: n / (n - 1) in variance."""
-    frames = np.sum(~np.isnan(still[:, :, 0]), axis=1)
-    return float(np.sqrt(np.mean(frames / np.maximum(frames - 1, 1))))
+def _flight_noise(measured: Floats) -> tuple[Floats, Floats]:
+    """(C,) standard deviation by the middle of seven frames against the parabola through the others; (C,) its freedom.
 
-
-def _flight_sigma(measured: Floats) -> Floats:
-    """(C,) robust deviation of the middle of seven frames from the parabola through the others.
-
-    Frames with contacts are a minority and fall to the median. White noise only: correlated noise follows the parabola.
+    Only the calmer half of the windows counts, by what the other six leave of their parabola: that keeps contacts out,
+    and of a window's normal noise it says nothing about the middle. For white noise: correlated noise follows the
+    parabola.
     """
     half = _WINDOW // 2
     offsets = np.arange(-half, half + 1, dtype=float)
     others = offsets != 0
     design = np.vander(offsets[others], 3, increasing=True)
     weights = np.linalg.pinv(design)[0]  # value of the parabola at the middle
-    frames = measured.shape[1] - 2 * half
+    frames, columns = measured.shape[1] - 2 * half, measured.shape[2]
     if frames < 1:
-        return np.full(measured.shape[2], np.nan)
+        return np.full(columns, np.nan), np.zeros(columns)
     windows = np.stack([measured[:, i : i + frames] for i in range(_WINDOW)], axis=-1)
-    deviation = windows[..., half] - windows[..., others] @ weights
-    return np.asarray(1.4826 * np.nanmedian(np.abs(deviation), axis=(0, 1)) / np.sqrt(1 + np.sum(weights**2)))
+    around = windows[..., others]
+    deviation = windows[..., half] - around @ weights
+    rough = np.sum((around - around @ (design @ np.linalg.pinv(design)).T) ** 2, axis=-1)
+    out, freedom = np.full(columns, np.nan), np.zeros(columns)
+    for c in range(columns):
+        seen = ~np.isnan(rough[..., c]) & ~np.isnan(deviation[..., c])
+        if not seen.any():
+            continue
+        calm = seen & (rough[..., c] <= np.median(rough[..., c][seen]))
+        chosen = deviation[..., c][calm]
+        limit = 3.5 * 1.4826 * np.median(np.abs(chosen))
+        out[c] = np.sqrt(np.mean(np.clip(chosen, -limit, limit) ** 2) / (1 + np.sum(weights**2)))
+        freedom[c] = len(chosen) * _OWN
+    return out, freedom

@@ -13,6 +13,7 @@ from compass_ros.calibration.refine import ROBUST, calmed, covariance
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.impulses import impulses
 from compass_ros.discovery.joint import Joint, converge, fit_jointly
+from compass_ros.discovery.remainder import smooth_excess
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import score
 
@@ -26,6 +27,12 @@ FORM_SHARE = 0.6
 """...if the effect explains at least this share."""
 NEEDED = 0.1
 """Share of the excess that each effect of a pair must be worth."""
+SECOND = 0.025
+"""Excess of chi-square that an effect which is enough must leave for a second one to be looked for."""
+FORM_LEFT = 0.25
+"""Part of that which a second effect may leave."""
+OF_LIMIT = 8.0
+"""Log evidence by which an effect must surpass what it comes to at an end of its shapes."""
 TRIED = 6
 """Names that are fitted at once, the most promising first; as many again where none of them is enough."""
 PROMISING = 0.1
@@ -66,6 +73,8 @@ class Choice:
     """Cost of the plain model above the noise floor."""
     floor: float
     """Cost that the noise alone leaves."""
+    two: bool = False
+    """The first single is enough, and the pair still explains what it leaves: there are two."""
 
     def share(self, joint: Joint) -> float:
         """Part of the excess that a model explains."""
@@ -126,10 +135,15 @@ def noise_cost(likelihood: Likelihood, fit: Fit) -> float:
     return of_noise * float(np.sum(np.broadcast_to(quiet, measured.shape)[measured])) - 0.5 * len(fit.free)
 
 
+def floor_of(likelihood: Likelihood, fit: Fit, reached: float) -> float:
+    """Cost that noise alone leaves, from a fit of cost `reached`: less what is still smooth in its residual."""
+    return reached - 0.5 * max(smooth_excess(likelihood, fit.point, fit.robust), 0.0) * likelihood.measurements
+
+
 def choose(space: Space, scores: Sequence[Score], candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
     """Fit the promising candidates; where none is enough, others, and then the best of them with a second one."""
     base = float(cost(space.likelihood, [space.fit.point], space.fit.robust)[0][0])
-    floor = min(noise_cost(space.likelihood, space.fit), base)
+    floor = floor_of(space.likelihood, space.fit, base)
     singles: list[Joint] = []
     for promising in _rounds(scores):
         tried = [fit_jointly(space, [s], 4, tolerance=2.0) for s in promising]
@@ -139,18 +153,50 @@ def choose(space: Space, scores: Sequence[Score], candidates: Sequence[Candidate
         singles = sorted([*(converge(j) for j in singles[:2]), *singles[2:]], key=_worth)
         if not singles:
             break
-        floor = min(floor, *(j.fit.point.cost for j in singles))
+        cheapest = min(singles, key=lambda j: j.fit.point.cost)
+        floor = floor_of(cheapest.likelihood, cheapest.fit, cheapest.fit.point.cost)
         choice = Choice(tuple(singles), None, base - floor, floor)
         good = [j for j in singles[:4] if choice.enough(j) and unseen.helps(j)]
         good.sort(key=lambda j: -evidence(j, unseen))
         if good:
-            others = [j for j in singles if j is not good[0]]
-            return Choice((good[0], *others), None, base - floor, floor)
+            first = simplest(good)
+            others = [j for j in singles if j is not first]
+            return _with_second(Choice((first, *others), None, base - floor, floor), candidates, unseen)
     if not singles:
         return Choice((), None, base - floor, floor)
     pair = _second(singles[0], singles, candidates)
-    floor = min(floor, pair.fit.point.cost) if pair else floor
+    if pair and pair.fit.point.cost < cheapest.fit.point.cost:
+        floor = floor_of(pair.likelihood, pair.fit, pair.fit.point.cost)
     return Choice(tuple(singles), pair, base - floor, floor)
+
+
+def simplest(good: Sequence[Joint]) -> Joint:
+    """The best, or what it comes to at an end of its shapes where that explains as much."""
+    best = good[0]
+    limit = best.added[0].effect.limit
+    plain = next((j for j in good if j.name == limit), None)
+    return plain if plain is not None and _worth(plain) - _worth(best) < OF_LIMIT else best
+
+
+def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
+    """The same with a second effect where the first leaves something, and that has a cause of its own.
+
+    What a wrong functional form leaves is explained in part by many effects and wholly by none; a second effect is
+    explained wholly by one.
+    """
+    first = choice.singles[0]
+    left = choice.remainder(first)
+    if left < SECOND:
+        return choice
+    pair = _second(first, [first], candidates)
+    if pair is None:
+        return choice
+    floor = floor_of(pair.likelihood, pair.fit, pair.fit.point.cost)
+    choice = replace(choice, pair=pair, floor=floor, excess=choice.excess + choice.floor - floor)
+    seen, rest = unseen.surprise(first) - unseen.surprise(pair), unseen.surprise(first) - unseen.floor
+    predicts = seen > HELD_OUT_SHARE * rest if rest > HELD_OUT_SEEN else seen > -5.0
+    wholly = choice.remainder(pair) < FORM_LEFT * choice.remainder(first)
+    return replace(choice, two=predicts and wholly)
 
 
 def _worth(joint: Joint) -> float:

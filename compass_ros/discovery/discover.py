@@ -12,7 +12,7 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import Refined, covariance, polish
 from compass_ros.discovery.candidates import Candidate, candidates
-from compass_ros.discovery.choose import NEEDED, Choice, HeldOut, choose, evidence, held_out, noise_cost
+from compass_ros.discovery.choose import NEEDED, Choice, HeldOut, choose, evidence, held_out
 from compass_ros.discovery.formula import Proposal, propose
 from compass_ros.discovery.impulses import impulses
 from compass_ros.discovery.information import information
@@ -20,8 +20,9 @@ from compass_ros.discovery.joint import Joint
 from compass_ros.discovery.maps import TableMap, residual_map
 from compass_ros.discovery.next_shot import next_experiment
 from compass_ros.discovery.null import Null, simulate_null
-from compass_ros.discovery.numerics import numerical_cause
+from compass_ros.discovery.numerics import numerical_cause, shift
 from compass_ros.discovery.plan import objections, plan_of
+from compass_ros.discovery.remainder import smooth_excess
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import score
 from compass_ros.discovery.unknown import whereabouts
@@ -42,13 +43,13 @@ from compass_ros.types import (
 LEAST_GAIN = 10.0
 """Log likelihood that an effect must gain, whatever the null says."""
 SOMETHING = 0.06
-"""Excess of chi-square above the noise from which something is there although no candidate stands out."""
+"""Excess of chi-square (`smooth_excess`) from which something is there although no candidate stands out."""
 NOTICED = 0.25
 """Least rms movement by what is missing, as a share of the cell's expected noise: less is the tracker's own error."""
 EQUAL = 3.0
 """Log evidence within which two effects are told apart by nothing."""
 EQUAL_SHARE = 0.015
-"""The same as a share of the gain: functional forms are never exactly right."""
+"""The same as a share of the excess: functional forms are never exactly right."""
 MIN_EPISODES = 3
 
 
@@ -116,7 +117,8 @@ def discover(
     found = Finding(simulator, refined, judge, noise, null, undetectable, before, seed, warnings)
     if not _something(space, scores, null, noise):
         return found.none(scores)
-    cause = numerical_cause(space, refined.fit.point.cost - noise_cost(space.likelihood, space.fit))
+    excess = smooth_excess(space.likelihood, space.fit.point, space.fit.robust)
+    cause = numerical_cause(space, 0.5 * excess * space.likelihood.measurements)
     if cause:
         return found.failed(f"No verdict: {cause}. That is the simulator's numerics, not physics.")
     tell("fit effects", 0.4)
@@ -143,8 +145,7 @@ def _screen(simulator: Simulator, refined: Refined, asked: Sequence[Candidate]) 
 def _something(space: Space, scores: Sequence[Score], null: Null, noise: Noise) -> bool:
     """Whether a candidate or the sum of residuals stands out from the noise, by an amount that matters."""
     gain = scores[0].gain / noise.correlation_time if scores else 0.0
-    floor = noise_cost(space.likelihood, space.fit)
-    excess = 2 * (space.fit.point.cost - floor) / space.likelihood.measurements
+    excess = smooth_excess(space.likelihood, space.fit.point, space.fit.robust)
     gained = 2 * max(scores[0].gain if scores else 0.0, 0.0) / space.likelihood.measurements
     moved = float(np.sqrt(max(excess, gained, 0.0)) * np.median(noise.sigma))
     if moved < NOTICED * space.simulator.cell.spec.noise_m:
@@ -201,6 +202,8 @@ class Finding:
     def judged(self, space: Space, choice: Choice, unseen: HeldOut) -> Discovery:
         """Named, ambiguous, unknown or failed."""
         best = choice.singles[0] if choice.singles else None
+        if choice.two and choice.pair is not None:
+            return self.named(choice.pair, choice, ((), ()))
         if best is not None and choice.enough(best) and unseen.helps(best):
             return self.named(best, choice, (self._equals(best, choice, unseen),))
         pair = choice.pair
@@ -274,14 +277,20 @@ class Finding:
         )
 
     def _equals(self, best: Joint, choice: Choice, unseen: HeldOut) -> tuple[Joint, ...]:
-        """Other effects that explain the recordings as well: within EQUAL of log evidence, or of the gain's share."""
+        """Other effects that explain the recordings as well: within EQUAL of log evidence, or EQUAL_SHARE."""
         kappa = self.noise.correlation_time
 
         top = evidence(best, unseen)
         margin = max(EQUAL, EQUAL_SHARE * choice.excess / kappa)
         seen, out = {best.name}, []
         for joint in choice.singles[1:]:
-            if joint.name not in seen and top - evidence(joint, unseen) < margin and unseen.helps(joint):
+            contains = joint.added[0].effect.limit == best.name
+            if (
+                joint.name not in seen
+                and not contains
+                and top - evidence(joint, unseen) < margin
+                and unseen.helps(joint)
+            ):
                 out.append(joint)
             seen.add(joint.name)
         return tuple(out)
@@ -319,10 +328,15 @@ class Finding:
         return Evidence(self._gain(joint), gained / kappa + hessians - without, self.null.false_alarm_p(gained / kappa))
 
     def _std(self, joint: Joint) -> Floats:
-        """(P + Q,) standard deviations; the prior's where the recordings say nothing."""
+        """(P + Q,) standard deviations; the prior's where the recordings say nothing.
+
+        Those of effects hold what a finite time step does to them; the parameters are those of this simulator.
+        """
         std = joint.likelihood.prior_std.copy()
         free = joint.fit.free
-        std[free] *= np.sqrt(np.diag(covariance(joint.likelihood, joint.fit))[: len(free)])
+        of_effects = free >= len(self.simulator.cell.parameters)
+        variance = np.diag(covariance(joint.likelihood, joint.fit))[: len(free)]
+        std[free] *= np.sqrt(variance + np.where(of_effects, shift(joint), 0.0) ** 2)
         return std
 
     def _plain(self) -> Likelihood:

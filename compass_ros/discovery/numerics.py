@@ -7,6 +7,9 @@ from collections.abc import Iterator, Mapping
 import mujoco
 import numpy as np
 
+from compass_ros.calibration.least_squares import Fit, normal_equations
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.discovery.joint import Joint
 from compass_ros.discovery.screen import Space
 from compass_ros.simulation import Simulator
 from compass_ros.types import Floats
@@ -43,16 +46,31 @@ def _others(simulator: Simulator) -> Iterator[tuple[str, Mapping[str, float]]]:
         yield "Newton's solver", {"solver": int(newton)}
 
 
+def shift(joint: Joint) -> Floats:
+    """(p,) how far the free quantities of a fit move when the time step is halved [prior standard deviations].
+
+    What an effect is said to be is a claim about physics, and a simulator with a finite step says it not quite right.
+    """
+    simulator, likelihood, fit = joint.simulator, joint.likelihood, joint.fit
+    moved = _moved(simulator, likelihood, fit, {"timestep": 0.5 * simulator.options.timestep})
+    weight = (1 + (fit.linear.residual / fit.robust) ** 2) ** -0.5
+    jacobian = fit.linear.jacobian
+    hessian, _ = normal_equations(likelihood, fit.point, fit.linear, fit.free, fit.robust)
+    pull = np.einsum("efcp,efc->p", jacobian, weight * moved)
+    return np.asarray(-np.linalg.solve(hessian, np.pad(pull, (0, len(hessian) - len(pull)))))[: len(pull)]
+
+
 def _gain(space: Space, options: Mapping[str, float]) -> float:
     """Fall of the cost with other numerics, after the parameters have adapted to first order."""
-    likelihood, fit = space.likelihood, space.fit
-    simulator = space.simulator
+    change = _moved(space.simulator, space.likelihood, space.fit, options).reshape(space.weight.shape) * space.weight
+    matrix, pull = space.reduced_tangent(change.reshape(-1, 1))
+    return -float(pull[0] + 0.5 * matrix[0, 0])
+
+
+def _moved(simulator: Simulator, likelihood: Likelihood, fit: Fit, options: Mapping[str, float]) -> Floats:
+    """(E, F, C) change of the residual by other numerics [sigma]; 0 where nothing was measured."""
     other = Simulator(simulator.cell, simulator.effects, simulator.threads, options)
     values = np.tile(fit.point.values, (len(likelihood.inputs), 1))
     inputs = likelihood.inputs + fit.point.launch
-    moved = other.observe(values, inputs, likelihood.time_s) - simulator.observe(values, inputs, likelihood.time_s)
-    weighted = np.nan_to_num(moved / likelihood.sigma).reshape(space.weight.shape) * space.weight
-    seen = ~np.isnan(likelihood.measured).reshape(space.weight.shape)
-    change: Floats = np.where(seen, weighted, 0.0).reshape(-1, 1)
-    matrix, pull = space.reduced_tangent(change)
-    return -float(pull[0] + 0.5 * matrix[0, 0])
+    change = other.observe(values, inputs, likelihood.time_s) - simulator.observe(values, inputs, likelihood.time_s)
+    return np.where(np.isnan(likelihood.measured), 0.0, change / likelihood.sigma)

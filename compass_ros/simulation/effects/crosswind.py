@@ -27,4 +27,5 @@ EFFECT = Effect(
     sentence="a steady stream of air across the table",
     forces=_forces,
     superposes=False,
+    limit="table_tilt",
 )

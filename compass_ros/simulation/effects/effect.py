@@ -67,6 +67,8 @@ class Effect:
     """Whether small amplitudes add up; False: each direction of the amplitudes is a case of its own."""
     on: Literal["objects", "walls", "cell"] = "objects"
     """What it acts on: `objects` (all that are tracked, or some), `walls` (one fixed geom of the scene), `cell`."""
+    limit: str = ""
+    """Name of the simpler effect that it comes to at an end of its shapes' ranges; empty: none."""
 
 
 RESTORED = ("geom_pos", "geom_quat", "geom_sameframe", "geom_solref", "body_ipos", "body_sameframe", "pair_solref")

@@ -1,0 +1,32 @@
+"""How much a model leaves unexplained, told from noise by its smoothness, not by a level that must be known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from compass_ros.calibration.least_squares import Point
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.refine import residual_at
+
+_LAGS = (1, 2, 3, 4)
+"""Frames over which what is missing hardly changes."""
+
+
+def smooth_excess(likelihood: Likelihood, point: Point, robust: float) -> float:
+    """Mean square of what the model misses [sigma^2]: the residual's autocovariance beyond the noise's own.
+
+    A residual is noise plus something that follows the motion. At a lag of some frames white noise is gone and the rest
+    is still there; noise of correlation r (AR(1)) leaves r^lag. With N residuals the standard error is about
+    1 / sqrt(4 N), where the residual's mean square is known no better than the noise.
+    """
+    residual = residual_at(likelihood, point)
+    residual = residual * (1 + (residual / robust) ** 2) ** -0.25  # as the robust loss counts it
+    seen = ~np.isnan(likelihood.measured)
+    correlation = (likelihood.correlation_time - 1) / (likelihood.correlation_time + 1)
+    found = []
+    for lag in _LAGS:
+        both = seen[:, lag:] & seen[:, :-lag]
+        if both.any():
+            product = residual[:, lag:] * residual[:, :-lag]
+            found.append(float(np.mean(product[both])) - correlation**lag)
+    return float(np.mean(found)) if found else 0.0
