@@ -14,11 +14,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import yaml
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from compass_ros.cells import load
+from compass_ros.concealed.stage import Stage, read_secret
 from compass_ros.episodes import Source, read_episodes
 from compass_ros.nodes.play import play, table_shift
 from compass_ros.reporting.palette import LIGHT
@@ -44,12 +44,12 @@ def main(folder: Path, out: Path) -> None:
     episode = max(held_out, key=lambda e: min(float(np.ptp(t.value, axis=0).sum()) for t in e.tracks))
     action = np.array([episode.action[field.name] for field in cell.action])
     simulator = Simulator(cell)
-    truth = cell.values(yaml.safe_load((folder / "truth.yaml").read_text()))
+    secret = read_secret(folder / "truth.json", cell)
     found = np.array([row["value"] for row in result["parameters"]])
 
-    config, shift = SceneConfig(), table_shift(cell, truth)
+    config, shift = SceneConfig(), table_shift(cell, secret.values)
     camera = make_camera(config, 0, shift)
-    film = play(simulator, config, truth, action)
+    film = play(Stage(cell, secret), config, action)
     image = render(camera, film.poses(film.begin + round(SHOWN_S * config.camera.rate_hz)), 0)
     paths = {track.object: _after(track, episode.start_ns) for track in episode.tracks}
 

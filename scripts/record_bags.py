@@ -32,7 +32,7 @@ def main() -> None:
         return
     with tempfile.TemporaryDirectory() as folder:
         demo = Path(folder) / "demo"
-        words = ["demo", "--shots", str(SHOTS), "--out", str(demo), "--method", "random"]
+        words = ["demo", "--shots", str(SHOTS), "--out", str(demo), "--method", "random", "--effect", "none"]
         subprocess.run([sys.executable, "-m", "compass_ros.cli", *words], check=True)
         for bag in BAGS.glob("episode_*"):
             shutil.rmtree(bag)

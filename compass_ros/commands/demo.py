@@ -15,6 +15,10 @@ import typer
 from compass_ros.cells import Cell
 from compass_ros.commands.progress import Bar
 
+ANSWERS = Path("~/.local/share/compass_ros/answers")
+DEFAULT_EFFECT = "swirl"
+"""What is concealed where neither a seed nor an effect is asked for."""
+
 
 def add_to(app: typer.Typer) -> None:
     app.command()(demo)
@@ -23,40 +27,65 @@ def add_to(app: typer.Typer) -> None:
 def demo(
     shots: Annotated[int, typer.Option(min=4, help="shots to play and record")] = 12,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="draws the hidden parameters and the shots; without: the paper's values")
+        int | None,
+        typer.Option(
+            min=0,
+            help=f"draws parameters, effect and shots; without: the paper's parameters and {DEFAULT_EFFECT}",
+        ),
+    ] = None,
+    effect: Annotated[
+        str | None, typer.Option(help="the concealed effect by name; none: wrong parameters alone")
     ] = None,
     out: Annotated[Path, typer.Option(help="folder of bags, result and logs; an earlier demonstration there goes")] = (
         Path("out/demo")
     ),
     method: Annotated[str, typer.Option(help="as for `compass calibrate`")] = "default",
     cell: Annotated[str, typer.Option(help="name of the cell, or path of its YAML")] = "air_hockey",
+    answers: Annotated[Path, typer.Option(help="folder of the sealed answers, never under --out")] = ANSWERS,
 ) -> None:
-    """Play shots in a cell with hidden parameters, follow them by camera, find the parameters, then look them up."""
+    """Play shots in a cell with hidden parameters and physics, find both from its camera, then open the answer."""
+    from rich.console import Console
+
     from compass_ros.cells import load
+    from compass_ros.commands.unseal import show
+    from compass_ros.concealed.comparison import compare
     from compass_ros.demo.processes import NodeGroup
-    from compass_ros.demo.session import Plan, calibrate, play, prepare
-    from compass_ros.reporting import print_result, read_result
+    from compass_ros.demo.session import Plan, calibrate, conceal, play, prepare, reveal
+    from compass_ros.reporting import read_result
     from compass_ros.reporting.from_json import from_json
+    from compass_ros.reporting.table import parameter_table, print_verdict
 
     signal.signal(signal.SIGTERM, _interrupt)
     started = time.monotonic()
-    plan = Plan(load(cell), shots, seed, method, out)
+    drawn = "" if seed is not None else DEFAULT_EFFECT
+    plan = Plan(load(cell), shots, seed, drawn if effect is None else effect, method, out, answers)
     prepare(plan)
+    answer_file = conceal(plan)
+    typer.echo(f"What is wrong with the cell is sealed: SHA-256 {answer_file.stem}... ({out}/seal.json)")
+    sealed = time.monotonic()
     with NodeGroup(plan.logs) as nodes:
         typer.echo(f"A virtual robot cell plays {shots} shots; its camera sees them, the tracker follows the pucks.")
         with Bar() as bar:
-            played = play(plan, nodes, bar)
+            messages = play(plan, answer_file, nodes, bar)
         recorded = time.monotonic()
         typer.echo(
-            f"{len(played.messages)} episodes in {plan.bags}, {sum(played.messages)} messages, "
-            f"{recorded - started:.0f} s. The calibrator reads them."
+            f"{len(messages)} episodes in {plan.bags}, {sum(messages)} messages, "
+            f"{recorded - sealed:.0f} s. The calibrator reads them."
         )
         with Bar() as bar:
             calibrate(plan, nodes, bar)
     content = read_result(plan.result / "result.json")
-    print_result(from_json(content), worth_showing(content, played.truth, plan.cell))
+    result, console = from_json(content), Console()
+    print_verdict(result, console)
     typer.echo(difference_line(content["gap"]))
-    typer.echo(f"Recorded in {recorded - started:.0f} s, calibrated in {time.monotonic() - recorded:.0f} s.")
+    answer = reveal(plan)
+    typer.echo("\nNow the answer is opened. Its hash is the one that was sealed before the first shot.")
+    console.print(parameter_table(result, worth_showing(content, answer["parameters"], plan.cell)))
+    show(content, answer, compare(content, answer))
+    typer.echo(
+        f"Sealed in {sealed - started:.0f} s, recorded in {recorded - sealed:.0f} s, "
+        f"calibrated in {time.monotonic() - recorded:.0f} s."
+    )
     typer.echo(f"report: {os.path.relpath(plan.result / 'report.html')}")
 
 

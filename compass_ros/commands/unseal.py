@@ -33,7 +33,7 @@ def unseal(
         typer.echo(f"true: {_truth(opened.answer)}")
         return
     content = read_result(result)
-    _show(content, opened.answer, compare(content, opened.answer))
+    show(content, opened.answer, compare(content, opened.answer))
 
 
 def _result_of(path: Path) -> Path | None:
@@ -62,12 +62,16 @@ def _truth(answer: Any) -> str:
     return "; ".join(parts) or "nothing is missing"
 
 
-def _show(result: Any, answer: Any, marks: Comparison) -> None:
+def show(result: Any, answer: Any, marks: Comparison) -> None:
+    """The table of what a result said beside what is true."""
     from rich.console import Console
     from rich.table import Table
 
+    from compass_ros.reporting.table import NARROW
+
     console = Console()
-    table = Table("", "said", "true", "", title=f"{answer['cell']}, seed {answer['seed']}: the seal is whole")
+    title = f"{answer['cell']}, seed {answer['seed']}: the seal is whole"
+    table = Table("", "said", "true", "", title=title, title_justify="left", **NARROW)
     said = ", ".join(marks.found) or "no effect"
     table.add_row("verdict", f"{marks.verdict}: {said}", _truth(answer), _mark(marks.right))
     if len(marks.twins) > 1:
@@ -86,6 +90,11 @@ def _show(result: Any, answer: Any, marks: Comparison) -> None:
     for check in marks.parameters:
         found = f"{check.found:.4g} +- {check.std:.2g}"
         table.add_row(check.name, found, f"{check.truth:.4g}", f"{100 * check.error:.0f} %")
+    shown = {check.name for check in marks.parameters}
+    for e in effects:
+        for name, value in e["library"].items():
+            if f"{e['name']}.{name}" not in shown and not name.startswith("centre_"):
+                table.add_row(f"{e['name']}.{name}", "-", f"{value:.4g}")
     for name, value in marks.held_out_m.items():
         table.add_row(f"held-out error, {name}", f"{1e3 * value:.2f} mm", "")
     if marks.ordinary_z is not None:

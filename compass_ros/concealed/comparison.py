@@ -148,7 +148,8 @@ def _held_out(result: Json, answer: Json) -> dict[str, float]:
         for name, model in models.items()
         if model and model["held_out"] and model["held_out"]["rmse_m"] is not None
     }
-    floors = [answer["noise_floor_m"][name] for name in result["episodes"]["held_out"]]
+    known = answer["noise_floor_m"]
+    floors = [known[name] for name in result["episodes"]["held_out"] if name in known]
     return out | ({"floor": float(np.sqrt(np.mean(np.square(floors))))} if floors else {})
 
 

@@ -36,6 +36,8 @@ class Played:
     """(T + 1, S, 2, 2) [m/s]."""
     impacts: tuple[Impact, ...]
     """First touches in their order."""
+    state: Floats
+    """(T + 1, S, nq) positions of all joints of the scene, the pusher's among them."""
 
     def touched(self) -> dict[str, int]:
         """How many shots touch each thing."""
@@ -113,10 +115,12 @@ class Table:
             qpos[:] = start
         q, v, applied = np.zeros((3, shots, models[0].nv))
         position, velocity = np.zeros((2, steps + 1, shots, 2, 2))
+        state = np.zeros((steps + 1, shots, models[0].nq))
         dry = self._friction * self._load
         for step in range(steps + 1):
             for shot, (_, qpos, qvel, _, _) in enumerate(views):
                 q[shot], v[shot] = qpos, qvel
+            state[step] = q
             position[step] = q[:, dofs].reshape(shots, 2, 2) + self._rest
             velocity[step] = v[:, dofs].reshape(shots, 2, 2)
             if step == steps:
@@ -133,4 +137,4 @@ class Table:
                     touches[shot].step(d, now.time)
                 mujoco.mj_step(models[shot], d)
         impacts = sorted((impact for touch in touches for impact in touch.impacts), key=lambda impact: impact.time)
-        return Played(self.time_step, position, velocity, tuple(impacts))
+        return Played(self.time_step, position, velocity, tuple(impacts), state)

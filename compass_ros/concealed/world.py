@@ -73,7 +73,7 @@ def conceal(cell: Cell, wishes: Wishes) -> World:
         raise ConfigError(f"unknown noise '{wishes.noise}'; known: {', '.join(NOISES)}")
     streams = {name: np.random.default_rng([wishes.seed, i]) for i, name in enumerate(_STREAMS)}
     kind = _kind(wishes, streams["kind"])
-    values = _wrong_parameters(cell, streams["parameters"])
+    values = wrong_parameters(cell, streams["parameters"])
     inputs = choose_shots(cell, values, SHOTS, streams["shots"])
     time_s = frame_times(cell.duration, SHOTS, streams["frames"])
     judges = _judges(cell, values, inputs)
@@ -92,7 +92,7 @@ def conceal(cell: Cell, wishes: Wishes) -> World:
         "forms": wishes.forms,
         "time_step_s": TIME_STEP,
         "kind": kind,
-        "effects": [_described(s, judges, played) for s in found],
+        "effects": [described(s, judges, played) for s in found],
         "parameters": {p.name: float(v) for p, v in zip(cell.parameters, values, strict=True)},
         "noise_floor_m": floor,
         "numerics_rms_m": _numerics(judges[0], bias),
@@ -116,7 +116,7 @@ def _kind(wishes: Wishes, rng: Generator) -> Kind:
     return "two" if len(wishes.names) == 2 else "one"
 
 
-def _wrong_parameters(cell: Cell, rng: Generator) -> Floats:
+def wrong_parameters(cell: Cell, rng: Generator) -> Floats:
     """(P,) all of them, uniform within the half-width around the default and within the bounds."""
     low, high = (np.array([getattr(p, side) for p in cell.parameters]) for side in ("low", "high"))
     half = np.array([p.half_width for p in cell.parameters])
@@ -138,20 +138,21 @@ def _effects(kind: Kind, wishes: Wishes, judge: Judge, rng: Generator) -> list[S
     pool = OUTSIDE if kind == "outside" else KNOWN
     count = {"none": 0, "one": 1, "two": 2, "outside": 1}[kind]
     names = wishes.names or tuple(rng.choice(list(pool), count, replace=False).tolist())
-    places = _places(judge.base)
+    places = places_of(judge.base)
     found: list[Strength] = []
     for name in names:
         target = wishes.rms_m or float(np.exp(rng.uniform(np.log(WEAKEST), np.log(STRONGEST))))
-        found.append(_strong_enough(LAWS[name], wishes, places, judge, target, found, rng))
+        found.append(strong_enough(LAWS[name], wishes.forms == "other", places, judge, target, found, rng))
     return found
 
 
-def _strong_enough(
-    law: Law, wishes: Wishes, places: Places, judge: Judge, target: float, others: Sequence[Strength], rng: Generator
+def strong_enough(
+    law: Law, other_forms: bool, places: Places, judge: Judge, target: float, others: Sequence[Strength], rng: Generator
 ) -> Strength:
+    """Draw shapes of a law until one can be sized to `target` [m] and is unlike the others."""
     best: Strength | None = None
     for _ in range(_TRIES):
-        shape = law.draw(rng, places, 1.0 if wishes.forms == "other" else 0.0)
+        shape = law.draw(rng, places, float(other_forms))
         tried = sized(Ingredient(law, _objects(law, places, rng), shape), judge, target)
         unlike = all(_cosine(tried.left, other.left) < _UNLIKE for other in others)
         if unlike and (best is None or abs(tried.rms_m - target) < abs(best.rms_m - target)):
@@ -177,12 +178,13 @@ def _objects(law: Law, places: Places, rng: Generator) -> tuple[str, ...]:
     return PUCKS
 
 
-def _places(played: Played) -> Places:
+def places_of(played: Played) -> Places:
+    """Where laws can be seen in shots that were played without any."""
     moving = np.linalg.norm(played.velocity, axis=3) > _MOVING
     return Places(played.position[moving], played.touched(), played.position.shape[1])
 
 
-def _described(strength: Strength, judges: tuple[Judge, Judge], played: Played) -> dict[str, object]:
+def described(strength: Strength, judges: tuple[Judge, Judge], played: Played) -> dict[str, object]:
     """What the answer says of an effect."""
     fine, coarse = judges
     i = strength.ingredient

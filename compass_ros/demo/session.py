@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import math
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import yaml
 
 from compass_ros.cells import Cell
+from compass_ros.concealed.seal import seal, unseal
+from compass_ros.concealed.stage import draw
 from compass_ros.demo.processes import NodeGroup
 from compass_ros.demo.shots import draw_shots
-from compass_ros.errors import ConfigError
+from compass_ros.errors import ConfigError, DataError
 from compass_ros.types import Progress, Report
 
 MARK = "demo.yaml"
@@ -28,8 +33,12 @@ class Plan:
     shots: int
     seed: int | None
     """None: the truth is the `target` of the cell's parameters; else truth, shots and noise are drawn with it."""
+    effect: str
+    """Name of the concealed physics; `none`; empty: drawn with the seed."""
     method: str
     out: Path
+    answers: Path
+    """Folder of the sealed answers, outside of `out`."""
 
     @property
     def bags(self) -> Path:
@@ -41,22 +50,12 @@ class Plan:
 
     @property
     def truth(self) -> Path:
-        """What the virtual cell reveals; nothing reads it but people."""
-        return self.out / "truth.yaml"
+        """The unsealed answer; written when all is over, and nothing reads it but people."""
+        return self.out / "truth.json"
 
     @property
     def logs(self) -> Path:
         return self.out / "logs"
-
-
-@dataclass(frozen=True)
-class Played:
-    """What the shots left."""
-
-    truth: Mapping[str, float]
-    """The parameters that the virtual cell had, by name."""
-    messages: tuple[int, ...]
-    """Messages in each bag."""
 
 
 def prepare(plan: Plan) -> None:
@@ -73,19 +72,29 @@ def prepare(plan: Plan) -> None:
         raise ConfigError(f"{plan.out}: cannot be written: {error.strerror}") from error
 
 
-def play(plan: Plan, nodes: NodeGroup, report: Report) -> Played:
-    """Play and record all shots. The virtual cell, the tracker and the recorder have ended when this returns."""
-    hidden = ""
+def conceal(plan: Plan) -> Path:
+    """Draw what is wrong with the cell and seal it, before any shot; the answer's path. Raises ConfigError."""
+    shots = yaml.safe_load((plan.out / MARK).read_text(encoding="utf-8"))["shots"]
+    inputs = np.array([[shot[field.name] for field in plan.cell.action] for shot in shots])
+    values = None
     if plan.seed is None:
-        file = plan.logs / "hidden_parameters.yaml"
         targets = {p.name: p.target for p in plan.cell.spec.parameters if p.target is not None}
-        file.write_text(yaml.safe_dump(targets), encoding="utf-8")
-        hidden = str(file)
-    cell = nodes.start("virtual_cell", cell=str(plan.cell.path), hidden_parameters_file=hidden, seed=plan.seed or 0)
+        values = plan.cell.values(targets)
+    answer = draw(plan.cell, inputs, plan.seed or 0, values, plan.effect)
+    return seal(answer, plan.out, {}, plan.answers)
+
+
+def play(plan: Plan, answer: Path, nodes: NodeGroup, report: Report) -> tuple[int, ...]:
+    """Play and record all shots; the number of messages in each bag.
+
+    The virtual cell, the tracker and the recorder have ended when this returns. Raises DataError where the cell says
+    that it has played something else than what is sealed.
+    """
+    cell = nodes.start("virtual_cell", cell=str(plan.cell.path), answer_file=str(answer), seed=plan.seed or 0)
     tracker = nodes.start("puck_tracker")
     recorder = nodes.start("recorder", directory=str(plan.bags))
     shooter = nodes.start("shooter", pipe=True, cell=str(plan.cell.path), shots_file=str(plan.out / MARK), reveal=True)
-    truth: Mapping[str, float] = {}
+    truth: Mapping[str, object] = {}
     messages: list[int] = []
     report(Progress("start the nodes", 0, 0.0, math.nan, math.nan))
     for line in nodes.follow(shooter):
@@ -95,8 +104,16 @@ def play(plan: Plan, nodes: NodeGroup, report: Report) -> Played:
             messages.append(line["messages"])
             report(Progress("play shots", line["shot"], line["shot"] / line["of"], math.nan, math.nan))
     nodes.stop(cell, tracker, recorder, shooter)
-    plan.truth.write_text(yaml.safe_dump(dict(truth), sort_keys=False), encoding="utf-8")
-    return Played(truth, tuple(messages))
+    if truth.get("parameters") != unseal(plan.out, plan.answers).answer["parameters"]:
+        raise DataError("the virtual cell has played other parameters than those that were sealed")
+    return tuple(messages)
+
+
+def reveal(plan: Plan) -> Mapping[str, Any]:
+    """Open the seal, and leave the answer beside the bags. Raises BagError where it was altered."""
+    opened = unseal(plan.out, plan.answers)
+    plan.truth.write_text(json.dumps(opened.answer, indent=1), encoding="utf-8")
+    return opened.answer
 
 
 def calibrate(plan: Plan, nodes: NodeGroup, report: Report) -> None:

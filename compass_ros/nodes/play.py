@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from compass_ros.cells import Cell
+from compass_ros.concealed.stage import Stage
 from compass_ros.config import read_yaml
 from compass_ros.errors import ConfigError, nearest
-from compass_ros.simulation import Simulator
 from compass_ros.tracking.scene_config import SceneConfig
 from compass_ros.tracking.virtual_camera import exposure_times
 from compass_ros.types import Floats
@@ -85,25 +85,25 @@ def action_of(cell: Cell, names: Sequence[str], values: Sequence[float]) -> Floa
     return action
 
 
-def resting(simulator: Simulator, scene: SceneConfig, values: Floats) -> Play:
+def resting(stage: Stage, scene: SceneConfig) -> Play:
     """One image of the cell before any shot. Raises ConfigError if the scene cannot show this cell."""
-    middle = np.array([(field.low + field.high) / 2 for field in simulator.cell.action])
-    bodies = simulator.bodies(values, middle, np.array([0.0, simulator.time_step]))
+    middle = np.array([(field.low + field.high) / 2 for field in stage.cell.action])
+    bodies = stage.bodies(middle, np.array([0.0, stage.time_step]))
     if not set(scene.discs) <= set(bodies):
         raise ConfigError(
-            f"cell '{simulator.cell.name}' cannot be filmed: the scene shows {sorted(scene.discs)}, "
+            f"cell '{stage.cell.name}' cannot be filmed: the scene shows {sorted(scene.discs)}, "
             f"the cell moves {sorted(bodies)}"
         )
     frames = scene.camera.sub_frames
     return Play({name: np.repeat(bodies[name][:1], frames, axis=0)[None] for name in scene.discs}, 0)
 
 
-def play(simulator: Simulator, scene: SceneConfig, values: Floats, action: Floats) -> Play:
+def play(stage: Stage, scene: SceneConfig, action: Floats) -> Play:
     """A shot (A,) with still images before and after it."""
     rate = scene.camera.rate_hz
     begin = round(STILL_S * rate)
-    count = begin + round((simulator.cell.duration + STILL_S) * rate)
+    count = begin + round((stage.cell.duration + STILL_S) * rate)
     mid_s = (np.arange(count) - begin) / rate
-    times = np.clip(exposure_times(scene.camera, mid_s), 0.0, simulator.cell.duration)
-    flat = simulator.bodies(values, action, times.ravel())
+    times = np.clip(exposure_times(scene.camera, mid_s), 0.0, stage.cell.duration)
+    flat = stage.bodies(action, times.ravel())
     return Play({name: flat[name].reshape(*times.shape, 3) for name in scene.discs}, begin)

@@ -2,7 +2,8 @@
 
 For each shot it starts an episode, gives the command, waits until the tracker has followed the whole of it, and stops
 the episode. It prints one JSON object a line about each shot on standard output, and at the end, where it is asked to
-and the cell can tell, the true parameters. It ends when all is played; status 1 where something does not answer.
+and the cell can tell, its true parameters and physics. It ends when all is played; status 1 where something does not
+answer.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ class Shooter(Node):
         declare("shots_file", "", "YAML with the list `shots`, each a mapping from fields of the action to values")
         declare("pause_s", 0.8, "from the end of a shot to the next, while all is put back, in the sensor's time [s]")
         declare("timeout_s", 60.0, "an answer that takes longer will not come [s]")
-        declare("reveal", False, "ask the virtual cell for its true parameters when all is played")
+        declare("reveal", False, "ask the virtual cell for its true parameters and physics when all is played")
 
     def _on_pose(self, pose: PoseWithCovarianceStamped) -> None:
         self._newest_ns = max(self._newest_ns, stamp_ns(pose.header.stamp))
@@ -78,7 +79,7 @@ class Shooter(Node):
             info = self._record(shot)
             say(shot=number, of=len(self._shots), episode=info.episode, bag=info.bag, messages=info.messages)
         if self.get_parameter("reveal").value:
-            say(truth=json.loads(self._call(self._reveal, Trigger.Request()).message)["parameters"])
+            say(truth=json.loads(self._call(self._reveal, Trigger.Request()).message))
 
     def _record(self, shot: Mapping[str, float]) -> Any:
         """One episode; its EpisodeInfo. A shot that is not seen to its end leaves no bag."""

@@ -1,8 +1,8 @@
 """Node `virtual_cell`: stands where a robot cell and its camera stand.
 
-It takes a shot command, plays it in a simulator of its own whose parameters nobody else knows, and publishes what a
-camera over the table and the arm's encoders would: images, camera_info and joint angles. True poses stay inside. The
-service `~/reveal` tells the true parameters, for the end of a demonstration.
+It takes a shot command, plays it in a simulator of its own whose parameters nobody else knows, and in which physics may
+act that no other has, and publishes what a camera over the table and the arm's encoders would: images, camera_info and
+joint angles. True poses stay inside. The service `~/reveal` tells parameters and physics when a demonstration ends.
 
 Image stamps are simulated sensor times (the middle of each exposure), exactly one period apart; they start at the
 clock's time and go on however long the drawing takes. The bias of the tracked positions is drawn as what it is in a
@@ -12,6 +12,7 @@ real cell: table, walls and obstacle stand shifted against the fiducials.
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 from compass_interfaces.msg import ShotCommand
@@ -23,11 +24,11 @@ from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_srvs.srv import Trigger
 
 from compass_ros.cells import load
+from compass_ros.concealed.stage import Secret, Stage, read_secret
 from compass_ros.errors import CompassError, ConfigError
 from compass_ros.nodes import images
 from compass_ros.nodes.play import action_of, hidden_values, play, resting, table_shift
 from compass_ros.nodes.run import run
-from compass_ros.simulation import Simulator
 from compass_ros.tracking.arm import arm_pose
 from compass_ros.tracking.scene_config import SceneConfig, scene_config
 from compass_ros.tracking.tracker import use_one_core
@@ -45,11 +46,12 @@ class VirtualCell(Node):
         self._declare()
         self._cell = load(self.get_parameter("cell").value)
         file, seed = self.get_parameter("hidden_parameters_file").value, self.get_parameter("seed").value
-        self._values = hidden_values(self._cell, file, seed)
-        self._simulator = Simulator(self._cell, threads=1)
+        answer = self.get_parameter("answer_file").value
+        secret = read_secret(Path(answer), self._cell) if answer else Secret(hidden_values(self._cell, file, seed))
+        self._stage = Stage(self._cell, secret)
         self._scene = self._read_scene()
-        self._camera = make_camera(self._scene, seed, table_shift(self._cell, self._values))
-        self._rest = self._play = resting(self._simulator, self._scene, self._values)
+        self._camera = make_camera(self._scene, seed, table_shift(self._cell, secret.values))
+        self._rest = self._play = resting(self._stage, self._scene)
         self._command: ShotCommand | None = None
         self._drawn: NDArray[np.uint8] | None = None
         self._start_ns = self.get_clock().now().nanoseconds
@@ -73,6 +75,8 @@ class VirtualCell(Node):
         self.declare_parameter("cell", "air_hockey", describe("name of the cell to stand for, or path of its YAML"))
         hidden = "YAML of true parameters, name: value, the others at their defaults; empty: drawn with `seed`"
         self.declare_parameter("hidden_parameters_file", "", describe(hidden))
+        answer = "JSON of true parameters and concealed physics, as `compass demo` seals it; replaces the file above"
+        self.declare_parameter("answer_file", "", describe(answer))
         seeds = [IntegerRange(from_value=0, to_value=2**31 - 1, step=1)]
         self.declare_parameter("seed", 0, describe("seed of the hidden parameters and the noise", integer_range=seeds))
         factors = [FloatingPointRange(from_value=0.05, to_value=20.0)]
@@ -100,7 +104,7 @@ class VirtualCell(Node):
         except CompassError as error:
             self.get_logger().error(str(error))
             return
-        self._play = play(self._simulator, self._scene, self._values, action)
+        self._play = play(self._stage, self._scene, action)
         self._command, self._image_of_play = command, 0
 
     def _on_time(self) -> None:
@@ -134,7 +138,15 @@ class VirtualCell(Node):
 
     def _on_reveal(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         names = [parameter.name for parameter in self._cell.parameters]
-        truth = {"cell": self._cell.name, "parameters": dict(zip(names, self._values.tolist(), strict=True))}
+        secret = self._stage.secret
+        truth = {
+            "cell": self._cell.name,
+            "parameters": dict(zip(names, secret.values.tolist(), strict=True)),
+            "effects": [
+                {"name": i.law.name, "objects": list(i.objects), "size": i.size, "shape": dict(i.shape)}
+                for i in secret.ingredients
+            ],
+        }
         response.success, response.message = True, json.dumps(truth)
         return response
 

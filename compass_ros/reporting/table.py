@@ -38,6 +38,11 @@ def print_result(result: Result, truth: Mapping[str, float] | None = None, conso
     """
     out = console or Console()
     out.print(parameter_table(result, truth or {}))
+    print_verdict(result, out)
+
+
+def print_verdict(result: Result, out: Console) -> None:
+    """The gap, the checks that need attention, the verdict."""
     out.print(gap_table(result))
     checks = assess(result)
     level = overall(checks)

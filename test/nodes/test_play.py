@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from compass_ros.cells import Cell, load
+from compass_ros.concealed.stage import Secret, Stage
 from compass_ros.errors import ConfigError
 from compass_ros.nodes.play import action_of, hidden_values, play, resting, table_shift
 from compass_ros.simulation import Simulator
@@ -68,7 +69,7 @@ def test_an_action_is_taken_in_any_order_of_names(cell: Cell) -> None:
 
 def test_a_play_is_still_then_moves_then_is_still(cell: Cell) -> None:
     simulator = Simulator(cell, threads=1)
-    shown = play(simulator, SCENE, cell.defaults, action_of(cell, NAMES, [-0.22, 0.07, 0.0, 0.4]))
+    shown = play(Stage(cell, Secret(cell.defaults)), SCENE, action_of(cell, NAMES, [-0.22, 0.07, 0.0, 0.4]))
     assert shown.begin == 30
     assert shown.length == 30 + 150 + 30
     still = [shown.still(image) for image in range(shown.length + 5)]
@@ -89,4 +90,4 @@ def test_a_play_is_still_then_moves_then_is_still(cell: Cell) -> None:
 def test_a_cell_that_the_scene_does_not_show_is_refused(cell: Cell) -> None:
     scene = SceneConfig(discs={"cube": DiscConfig(colour=(1, 2, 3))}, arm=None)
     with pytest.raises(ConfigError, match=r"shows \['cube'\], the cell moves \['puck1', 'puck2', 'pusher'\]"):
-        resting(Simulator(cell, threads=1), scene, cell.defaults)
+        resting(Stage(cell, Secret(cell.defaults)), scene)

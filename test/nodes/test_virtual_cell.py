@@ -16,6 +16,9 @@ from sensor_msgs.msg import CameraInfo, JointState
 from std_srvs.srv import Trigger
 
 from compass_ros.cells import load
+from compass_ros.concealed.law import Ingredient
+from compass_ros.concealed.laws import LAWS
+from compass_ros.concealed.stage import Secret, Stage
 from compass_ros.nodes.images import stamp_ns
 from compass_ros.simulation import Simulator
 from test.nodes.conftest import StartNode
@@ -25,6 +28,14 @@ pytestmark = pytest.mark.ros
 IMAGES = QoSProfile(depth=60, reliability=ReliabilityPolicy.BEST_EFFORT)
 SHOT = {"x": -0.22, "y": 0.07, "angle": 0.05, "velocity": 0.45}
 TRUTH = {"env@camera@bias_x": 0.03, "env@camera@bias_y": -0.02, "puck2@dyna@friction_sliding": 0.03}
+
+
+def answer_of(stage: Stage) -> str:
+    """The JSON of an answer, as far as the cell reads it."""
+    secret = stage.secret
+    effects = [{"name": i.law.name, "objects": i.objects, "shape": i.shape, "size": i.size} for i in secret.ingredients]
+    names = [p.name for p in stage.cell.parameters]
+    return json.dumps({"parameters": dict(zip(names, secret.values.tolist(), strict=True)), "effects": effects})
 
 
 def command(**changes: float) -> ShotCommand:
@@ -83,6 +94,7 @@ def test_a_shot_is_filmed_tracked_and_revealed_only_on_request(
     assert topics == {"/virtual_cell/command", "/virtual_cell/joint_states", "/virtual_cell/shot"}
     told = json.loads(probe.call(Trigger, "/virtual_cell/reveal").message)
     assert told["parameters"] == dict(zip([p.name for p in cell.parameters], values.tolist(), strict=True))
+    assert told["effects"] == []
 
 
 def test_bad_commands_are_refused_in_one_line(start_node: StartNode, probe: Probe) -> None:
@@ -105,6 +117,37 @@ def test_bad_commands_are_refused_in_one_line(start_node: StartNode, probe: Prob
     assert node.stop() == 0, "in the middle of a shot"
     assert "Traceback" not in node.output()
     assert infos[0].width == 640
+
+
+def test_a_concealed_law_is_played_and_revealed(start_node: StartNode, probe: Probe, tmp_path: Path) -> None:
+    """The tracker sees the pucks where the law sends them, and not where the plain simulator would."""
+    cell = load("air_hockey")
+    tilt = Ingredient(LAWS["table_tilt"], shape={"x": 0.6, "y": 0.8, "warp": 0.0}, size=8.0)
+    stage = Stage(cell, Secret(cell.defaults, (tilt,)))
+    file = tmp_path / "answer.json"
+    file.write_text(answer_of(stage))
+    start_node("virtual_cell", answer_file=str(file), real_time_factor=0.5)
+    start_node("puck_tracker")
+    shots = probe.listen(ShotCommand, "/virtual_cell/shot")
+    heard = probe.listen(PoseWithCovarianceStamped, "/puck_tracker/puck1/pose", IMAGES)
+    send = probe.publisher(ShotCommand, "/virtual_cell/command")
+    probe.wait_for(heard)
+    send(command())
+    start = stamp_ns(probe.wait_for(shots).header.stamp)
+    until(lambda: stamp_ns(heard[-1].header.stamp) > start + 2_400_000_000, 15, "the end of the shot")
+
+    seen = [p for p in heard if start + 1_000_000_000 <= stamp_ns(p.header.stamp) <= start + 2_400_000_000]
+    time_s = np.array([(stamp_ns(p.header.stamp) - start) * 1e-9 for p in seen])
+    found = np.array([(p.pose.pose.position.x, p.pose.pose.position.y) for p in seen])
+    action = np.array([SHOT[field.name] for field in cell.action])
+
+    def error(of: Stage) -> float:
+        return float(np.median(np.linalg.norm(found - of.bodies(action, time_s)["puck1"][:, :2], axis=1)))
+
+    assert error(stage) < 0.001
+    assert error(Stage(cell, Secret(cell.defaults))) > 0.01
+    told = json.loads(probe.call(Trigger, "/virtual_cell/reveal").message)
+    assert [effect["name"] for effect in told["effects"]] == ["table_tilt"]
 
 
 def test_a_wrong_hidden_parameter_ends_the_node_with_one_line(start_node: StartNode, tmp_path: Path) -> None:
