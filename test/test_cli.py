@@ -304,6 +304,15 @@ def test_wrong_use_is_status_2(run: Run, tmp_path: Path) -> None:
         assert "Traceback" not in err
 
 
+def test_the_demo_refuses_effects_that_it_cannot_conceal(tmp_path: Path, run: Run) -> None:
+    for name, expected in (("camera_scale", "may conceal none, table_tilt"), ("swril", "did you mean 'swirl'")):
+        words = ("--shots", "4", "--effect", name, "--out", tmp_path / "demo", "--answers", tmp_path / "answers")
+        status, _, err = run("demo", *words)
+        assert status == 1
+        assert expected in err
+        assert not (tmp_path / "answers").exists()
+
+
 def test_the_demo_overwrites_nothing_of_others(tmp_path: Path, run: Run) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
     status, _, err = run("demo", "--out", tmp_path)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from compass_ros.cells import load
+from compass_ros.concealed.seal import unseal
 from compass_ros.episodes import find_bags, read_episodes
 from test.episodes.planted import PUCKS
 from test.nodes.harness import SHARED_MEMORY, held_locks, locks_in_use, until
@@ -29,9 +30,10 @@ class Demo:
         self.log = folder / "log"
         self._nodes: dict[int, list[Path]] = {}
         self._there_before = set(SHARED_MEMORY.iterdir())
+        places = ["--out", str(self.out), "--answers", str(folder / "answers")]
         with self.log.open("wb") as log:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "compass_ros.cli", "demo", "--out", str(self.out), *words],
+                [sys.executable, "-m", "compass_ros.cli", "demo", *places, *words],
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
@@ -75,7 +77,7 @@ def started(tmp_path: Path) -> Iterator[list[Demo]]:
 
 
 def test_the_main_job(tmp_path: Path, started: list[Demo]) -> None:
-    demo = Demo(tmp_path, "--shots", "6")
+    demo = Demo(tmp_path, "--shots", "6", "--effect", "none")
     started.append(demo)
     until(demo.look, 400, "the end of the demonstration")
     said = demo.log.read_text()
@@ -92,8 +94,12 @@ def test_the_main_job(tmp_path: Path, started: list[Demo]) -> None:
     assert found <= 0.4 * nominal
     row = next(row for row in result["parameters"] if row["name"] == "pusher@actuation@vel_discount")
     np.testing.assert_allclose(row["value"], 0.85, atol=0.02)
-    for words in ("truth", "0.85", "Held-out trajectory difference", "report:"):
+    for words in ("truth", "0.85", "Held-out trajectory difference", "nothing is missing", "report:"):
         assert words in said
+    assert said.index("is sealed: SHA-256") < said.index("camera sees them") < said.index("the answer is opened")
+    opened = unseal(demo.out, tmp_path / "answers").answer
+    assert opened["effects"] == []
+    assert json.loads((demo.out / "truth.json").read_text()) == opened
     assert (demo.out / "calibration" / "report.html").stat().st_size > 10**6
 
 
