@@ -27,10 +27,8 @@ FORM_SHARE = 0.6
 """...if the effect explains at least this share."""
 NEEDED = 0.1
 """Share of the excess that each effect of a pair must be worth."""
-SECOND = 0.025
-"""Excess of chi-square that an effect which is enough must leave for a second one to be looked for."""
 FORM_LEFT = 0.25
-"""Part of that which a second effect may leave."""
+"""Part of what one effect leaves that a second may leave to be its cause."""
 OF_LIMIT = 8.0
 """Log evidence by which an effect must surpass what it comes to at an end of its shapes."""
 TRIED = 6
@@ -185,8 +183,7 @@ def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOu
     explained wholly by one.
     """
     first = choice.singles[0]
-    left = choice.remainder(first)
-    if left < SECOND:
+    if 1 - choice.share(first) < NEEDED:
         return choice
     pair = _second(first, [first], candidates)
     if pair is None:
@@ -196,7 +193,8 @@ def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOu
     seen, rest = unseen.surprise(first) - unseen.surprise(pair), unseen.surprise(first) - unseen.floor
     predicts = seen > HELD_OUT_SHARE * rest if rest > HELD_OUT_SEEN else seen > -5.0
     wholly = choice.remainder(pair) < FORM_LEFT * choice.remainder(first)
-    return replace(choice, two=predicts and wholly)
+    needed = choice.share(pair) - choice.share(first) > NEEDED
+    return replace(choice, two=predicts and wholly and needed)
 
 
 def _worth(joint: Joint) -> float:
