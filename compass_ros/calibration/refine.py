@@ -23,6 +23,7 @@ from compass_ros.calibration.least_squares import (
     start,
 )
 from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.screen import acting
 from compass_ros.types import Floats, Ints
 
 HORIZONS = (0.16, 0.28, 0.4, 0.55, 0.75, 1.0)
@@ -31,6 +32,8 @@ FELT = 2.0
 """A parameter is free where half a prior width of it moves all recordings together by more than this many sigma."""
 STRONG = 60.0
 """The same for the first stage, in which the horizon grows."""
+COARSE = 0.3
+"""How far a parameter is moved to see whether it is felt, in prior widths."""
 ROBUST = 4.0
 """Scale of the loss [sigma]: Gaussian noise is hardly touched, a swapped or lost frame hardly counts."""
 
@@ -147,9 +150,11 @@ def scaled(linear: Linear, old: Likelihood, new: Likelihood) -> Linear:
 
 def sensitivity(likelihood: Likelihood, point: Point) -> tuple[Floats, Floats]:
     """(P,) sigma by which one prior width of each parameter moves all recordings; (P,) steps for differences."""
-    everything = np.arange(len(likelihood.parameters))
-    coarse = linearise(likelihood, point, everything, np.full(len(everything), 0.3))
-    return np.sqrt(np.sum(coarse.jacobian**2, axis=(0, 1, 2))), difference_steps(coarse)
+    strength, steps = np.zeros(len(likelihood.parameters)), np.ones(len(likelihood.parameters))
+    asked = np.flatnonzero(acting(likelihood, point, COARSE))
+    coarse = linearise(likelihood, point, asked, np.full(len(asked), COARSE))
+    strength[asked], steps[asked] = np.sqrt(np.sum(coarse.jacobian**2, axis=(0, 1, 2))), difference_steps(coarse)
+    return strength, steps
 
 
 def typical_residual(likelihood: Likelihood, point: Point) -> float:
@@ -193,6 +198,15 @@ def with_roughness(likelihood: Likelihood, fit: Fit, draws: int = 6) -> Likeliho
     spread = np.sqrt(np.mean(beyond**2, axis=0)) * likelihood.sigma
     grown = np.maximum.accumulate(spread, axis=1)  # roughness never heals
     return replace(likelihood, sigma=np.hypot(likelihood.sigma, grown))
+
+
+def fitted_launches(likelihood: Likelihood, values: Floats) -> Floats:
+    """(E, A) offsets of each episode's inputs that agree best with it, for (P,) values that stay as they are."""
+    point, nothing = start(likelihood, values), np.zeros(0, dtype=np.int64)
+    if not likelihood.launch_std.any():
+        return point.launch
+    robust = max(ROBUST, 3.0 * typical_residual(likelihood, point))
+    return minimise(likelihood, point, nothing, 12, robust, tolerance=1.0, fresh=False).point.launch
 
 
 def standard_errors(refined: Refined) -> tuple[Ints, Floats]:
