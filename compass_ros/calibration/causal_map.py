@@ -72,10 +72,11 @@ def to_estimate(problem: Problem, refined: Refined, trace: tuple[Iteration, ...]
 def intervention_graph(problem: Problem, refined: Refined) -> Graph:
     """psi from interventions at the estimate: how far each prior width moves each factor's trajectory.
 
-    What moved nothing when the refinement asked (`strength` 0) is not moved again and has no edge.
+    What moved nothing when the refinement asked is not moved again and has no edge; of hundreds of parameters, neither
+    has what another one stands for.
     """
     likelihood, point = refined.likelihood, refined.fit.point
-    moving = np.flatnonzero(refined.strength > 0)
+    moving = refined.asked
     count, episodes = len(moving), len(problem.actions)
     steps = moved_by(likelihood, point, INTERVENTION)
     values = np.tile(point.values, (count + 1, 1))

@@ -168,6 +168,7 @@ def _row(case: Case, difference: float) -> dict[str, object]:
         "edges": {"kept": 2, "precision": 1.0, "recall": None, "missed": [], "extra": []},
         "rollouts": 20,
         "rollouts_counted_by_simulator": 20,
+        "simulated_seconds": 50.0,
         "wall_seconds": 1.5,
         "trace": [step, step | {"rollouts": 20, "difference": [0.5, difference / 2]}],
     }
@@ -178,6 +179,8 @@ def test_tables_have_means_over_seeds_and_the_papers_number() -> None:
     rows.append(_row(Case("air_hockey", "npdr", 0), 0.5))
     lines = tables(rows).splitlines()
     assert lines[0] == "### air_hockey"
+    assert lines[2].endswith("| rollouts | simulated [s] | wall [s] |")
+    assert lines[4].endswith("| 20 | 50 | 1.5 |")
     assert lines[4].startswith("| npdr | 1 | 0.2 | 0.29 |")  # the smaller difference first
     assert lines[5].startswith("| compass | 3 | 0.2 ± 0 | 0.22 | - (0.0) | 2 ± 1 | 0.5 ± 0.25 |")
 
