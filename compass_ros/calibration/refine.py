@@ -95,7 +95,7 @@ def refine(likelihood: Likelihood, values: Floats, watch: Watch = lambda *_: Tru
     """Fit from the given (P,) values."""
     point = start(likelihood, values)
     first = sensitivity(some(likelihood), start(some(likelihood), values))
-    strong, steps = first.felt(STRONG, STRONG_SHARE), first.steps
+    strong, steps = first.felt(STRONG, STRONG_SHARE), first.steps.copy()
     for i, share in enumerate(HORIZONS):
         part = likelihood.until(share * float(likelihood.time_s.max()))
         robust = max(ROBUST, 3.0 * typical_residual(part, point))
