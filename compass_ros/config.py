@@ -6,6 +6,7 @@ import reprlib
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
+from typing import Literal
 
 import yaml
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
@@ -13,6 +14,8 @@ from pydantic.dataclasses import dataclass
 
 from compass_ros.errors import ConfigError, nearest
 
+Parameters = Literal["cell", "auto"]
+"""What is tuned: the parameters that the cell lists, or every other tunable field of its scene too."""
 _strict = ConfigDict(extra="forbid")
 _short = reprlib.Repr()
 _short.maxlevel = 2  # the default of 6 levels of 6 entries is a screen full
@@ -69,6 +72,9 @@ class CalibrationConfig:
     """What `compass calibrate` does; everything but the recordings and the cell."""
 
     method: str = "default"
+    parameters: Parameters = Field(
+        default="cell", description="what is tuned: the cell's list, or auto: every tunable field of the scene too"
+    )
     seed: int = Field(default=0, ge=0)
     rollouts: int = Field(
         default=0, ge=0, description="most simulated rollouts of the method; 0 = what it takes by default"

@@ -15,14 +15,14 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.methods import compass_config, method
 from compass_ros.calibration.noise import Noise, measure_noise
 from compass_ros.calibration.problem import Allowance, Problem
-from compass_ros.calibration.refine import Refined, refine
+from compass_ros.calibration.refine import Refined, fitted_launches, refine
 from compass_ros.cells import Cell
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery, discover, not_evaluated
 from compass_ros.errors import DataError
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.factors import factor_distance
-from compass_ros.simulation.replay import Recordings, Replay, recordings
+from compass_ros.simulation.replay import Recordings, Replay, positions, recordings
 from compass_ros.types import (
     Budget,
     Episode,
@@ -141,7 +141,7 @@ def assemble(
     models = {"nominal": (simulator, simulator.defaults), "calibrated": (simulator, estimate.values)}
     if found.simulator is not None and found.values is not None:
         models["with_effects"] = (found.simulator, found.values)
-    replays = {name: (Replay(s, data), Replay(s, judge), v) for name, (s, v) in models.items()}
+    replays = {name: (launched(s, data, noise, v), launched(s, judge, noise, v), v) for name, (s, v) in models.items()}
     gap: dict[str, dict[str, Gap]] = {
         name: {"fit": fit.gap(v)} | ({"held_out": unseen.gap(v)} if held_out else {})
         for name, (fit, unseen, v) in replays.items()
@@ -179,10 +179,19 @@ def assemble(
     )
 
 
+def launched(simulator: Simulator, data: Recordings, noise: Noise, values: Floats) -> Replay:
+    """A replay of (P,) values in which each episode has the launch that agrees best with it.
+
+    How an arm repeats itself, or a first state that was measured with noise, differs from shot to shot: it says
+    nothing about a simulator. Where the cell calls its launches exact they stay as commanded.
+    """
+    return Replay(simulator, data, fitted_launches(pose(simulator, data, noise).likelihood, values))
+
+
 def noise_floor(cell: Cell, noise: Noise) -> float:
-    """Root mean square distance that the noise alone leaves [m]."""
-    objects = max(len(cell.objects), 1)
-    return float(np.sqrt(np.sum(noise.sigma**2) / objects))
+    """Root mean square distance that the noise alone leaves [m]: of positions, as in `Gap.rmse_m`."""
+    own = [list(columns) for columns in positions(cell).values()]
+    return float(np.sqrt(np.mean([np.sum(noise.sigma[columns] ** 2) for columns in own])))
 
 
 def versions() -> dict[str, str]:

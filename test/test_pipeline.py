@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from compass_ros.calibration.noise import Noise, measure_noise
+from compass_ros.cells import load
 from compass_ros.config import CalibrationConfig
 from compass_ros.errors import DataError
-from compass_ros.pipeline import calibrate, split
+from compass_ros.pipeline import calibrate, launched, noise_floor, split
+from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import Replay, recordings
 from compass_ros.types import Episode, Progress, Result, Track
 from test.simulation.table import actions, cell, simulator, values
@@ -135,3 +138,40 @@ def test_a_stop_is_said(episodes: list[Episode]) -> None:
         return False
 
     assert calibrate(episodes, cell(), CONFIG, stop)[0].cancelled
+
+
+def test_the_floor_is_of_positions_as_the_error_is() -> None:
+    """A cube's orientation has noise too, in another unit; `Gap.rmse_m` does not count it."""
+    push = load("push_i")
+    assert [o.quantity for o in push.objects] == ["pose"]
+    sigma = np.array([1e-3, 2e-3, 2e-3, 0.1, 0.1, 0.1, 0.1])
+    assert noise_floor(push, Noise(sigma, 0.0)) == pytest.approx(3e-3)
+    assert noise_floor(cell(), Noise(np.array([3e-3, 4e-3, 3e-3, 4e-3]), 0.0)) == pytest.approx(5e-3)
+
+
+def test_a_launch_that_differs_from_its_command_is_no_error_of_the_simulator() -> None:
+    """An arm that repeats its speed to 3 % and its angle to 0.02 rad, in front of a simulator that is right."""
+    own = cell()
+    own = replace(own, spec=replace(own.spec, launch_noise={"velocity": 0.015, "angle": 0.02}))
+    arm, commanded = Simulator(own, threads=2), actions(4, seed=9)
+    rng = np.random.default_rng(1)
+    true = commanded + own.launch_std * rng.normal(size=commanded.shape)
+    stamps = START + np.round(np.arange(-0.5, 2.5, 1 / 60) * 1e9).astype(np.int64)
+    seen = arm.observe(values({}, 4), true, np.tile((stamps - START) * 1e-9, (4, 1)))
+    seen = seen + rng.normal(0, NOISE, seen.shape)
+    shots = [
+        Episode(
+            f"shot{i}", own.name, own.hash, dict(zip(FIELDS, commanded[i].tolist(), strict=True)), START,
+            tuple(Track(f"puck{k + 1}", "xy", stamps, seen[i][:, 2 * k : 2 * k + 2]) for k in range(2)),
+        )
+        for i in range(4)
+    ]  # fmt: skip
+    data = recordings(own, shots)
+    noise = measure_noise(data.time_s, data.measured, own.spec.noise_m)
+    floor = noise_floor(own, noise)
+    assert Replay(arm, data).gap(own.defaults).rmse_m > 10 * floor
+    fitted = launched(arm, data, noise, own.defaults)
+    assert fitted.gap(own.defaults).rmse_m < 1.05 * floor
+    error = (fitted.inputs - true)[:, own.launch_std > 0] / own.launch_std[own.launch_std > 0]
+    assert np.abs(error).max() < 0.3
+    assert np.array_equal(launched(simulator(), data, noise, own.defaults).inputs, data.inputs)  # launches are exact

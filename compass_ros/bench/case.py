@@ -8,6 +8,7 @@ from itertools import product
 from typing import Literal
 
 from compass_ros.calibration.problem import Allowance
+from compass_ros.config import Parameters
 
 Start = Literal["default", "random"]
 
@@ -33,6 +34,8 @@ class Case:
     """First guess: the cell's defaults, or drawn uniformly within the bounds."""
     sparse_weight: float | None = None
     """lambda of loss (2), for the method `compass` only; None: the paper's."""
+    parameters: Parameters = "cell"
+    """What is tuned: the cell's list, or `auto`: every other tunable field of its scene too."""
 
     @property
     def allowance(self) -> Allowance:
@@ -66,6 +69,7 @@ def grid(
             base.missing,
             base.start,
             base.sparse_weight if method == "compass" else None,
+            base.parameters,
         )
         for seed, task, noise, method in product(seeds, tasks, noises, methods)
     )

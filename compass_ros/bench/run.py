@@ -19,6 +19,7 @@ from compass_ros.bench.edges import total_effects
 from compass_ros.bench.outcome import append, case_of, outcome, read
 from compass_ros.bench.world import World, build
 from compass_ros.calibration.methods import compass_config, method
+from compass_ros.cells import load
 from compass_ros.types import Estimate, Floats, Progress, Report, silent
 
 RESULTS = "results.jsonl"
@@ -84,17 +85,17 @@ class _Watcher:
 
 def _effects(case: Case, out: Path, threads: int) -> Floats:
     """Total effects of the task around its defaults, measured once and kept beside the results."""
-    reference = Case(case.task, "compass", 0)
-    path = out / f"effects-{Path(case.task).stem}.json"
-    world_hash = build(replace(reference, real=1), threads).cell.hash
+    reference = Case(case.task, "compass", 0, parameters=case.parameters)
+    which = "" if case.parameters == "cell" else f"-{case.parameters}"
+    path = out / f"effects-{Path(case.task).stem}{which}.json"
+    cell = load(case.task, case.parameters)
+    names = [p.name for p in cell.parameters]
     if path.exists():
         kept = json.loads(path.read_text(encoding="utf-8"))
-        if kept["cell_hash"] == world_hash:
+        if kept["cell_hash"] == cell.hash and kept["parameters"] == names:
             return np.array(kept["total_effects"])
-    world = build(reference, threads)
-    effects = total_effects(world.problem)
-    names = [p.name for p in world.cell.parameters]
-    content = {"cell_hash": world_hash, "parameters": names, "total_effects": np.round(effects, 6).tolist()}
+    effects = total_effects(build(reference, threads).problem)
+    content = {"cell_hash": cell.hash, "parameters": names, "total_effects": np.round(effects, 6).tolist()}
     path.write_text(json.dumps(content), encoding="utf-8")
     return np.round(effects, 6)
 

@@ -15,6 +15,7 @@ import numpy as np
 from compass_ros.calibration.least_squares import Point, start
 from compass_ros.calibration.problem import Allowance, Problem
 from compass_ros.calibration.refine import Refined, refine, standard_errors
+from compass_ros.calibration.screen import moved_by
 from compass_ros.types import Estimate, Floats, Graph, Iteration, Progress, Report
 
 EDGE_SHARE = 0.003
@@ -69,12 +70,17 @@ def to_estimate(problem: Problem, refined: Refined, trace: tuple[Iteration, ...]
 
 
 def intervention_graph(problem: Problem, refined: Refined) -> Graph:
-    """psi from interventions at the estimate: how far each prior width moves each factor's trajectory."""
+    """psi from interventions at the estimate: how far each prior width moves each factor's trajectory.
+
+    What moved nothing when the refinement asked is not moved again and has no edge; of hundreds of parameters, neither
+    has what another one stands for.
+    """
     likelihood, point = refined.likelihood, refined.fit.point
-    count, episodes = len(problem.parameters), len(problem.actions)
-    steps = INTERVENTION * likelihood.prior_std
-    steps = np.where(point.values + steps > likelihood.high, -steps, steps)
-    values = np.concatenate([point.values[None], point.values + np.diag(steps)])
+    moving = refined.asked
+    count, episodes = len(moving), len(problem.actions)
+    steps = moved_by(likelihood, point, INTERVENTION)
+    values = np.tile(point.values, (count + 1, 1))
+    values[1 + np.arange(count), moving] += steps[moving]
     index = np.tile(np.arange(episodes), count + 1)
     inputs, time = (likelihood.inputs + point.launch)[index], likelihood.time_s[index]
     there = likelihood.predict(np.repeat(values, episodes, axis=0), inputs, time)
@@ -83,5 +89,6 @@ def intervention_graph(problem: Problem, refined: Refined) -> Graph:
     effect: Floats = np.sqrt(np.mean(moved**2, axis=(1, 2)))
     share = effect**2 / np.maximum(np.sum(effect**2, axis=0), 1e-300)
     noise = float(np.median(likelihood.sigma))
-    psi = share / (share + EDGE_SHARE) * effect**2 / (effect**2 + noise**2)
+    psi = np.zeros((len(problem.parameters), len(problem.factors)))
+    psi[moving] = share / (share + EDGE_SHARE) * effect**2 / (effect**2 + noise**2)
     return Graph(tuple(p.name for p in problem.parameters), problem.factors, psi, 0.5)

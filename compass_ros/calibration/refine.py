@@ -23,6 +23,7 @@ from compass_ros.calibration.least_squares import (
     start,
 )
 from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.screen import WORTH, acting, coupling, independent, many
 from compass_ros.types import Floats, Ints
 
 HORIZONS = (0.16, 0.28, 0.4, 0.55, 0.75, 1.0)
@@ -31,6 +32,11 @@ FELT = 2.0
 """A parameter is free where half a prior width of it moves all recordings together by more than this many sigma."""
 STRONG = 60.0
 """The same for the first stage, in which the horizon grows."""
+FELT_SHARE, STRONG_SHARE = 1e-3, 0.02
+"""Of hundreds of parameters, these shares of the movement by all of them are asked for too; 0.055 is the root of the
+share of variance that makes an edge."""
+COARSE = 0.3
+"""How far a parameter is moved to see whether it is felt, in prior widths."""
 ROBUST = 4.0
 """Scale of the loss [sigma]: Gaussian noise is hardly touched, a swapped or lost frame hardly counts."""
 
@@ -45,6 +51,27 @@ Watch = Callable[[str, float, Point], bool]
 
 
 @dataclass(frozen=True)
+class Influence:
+    """How parameters move all recordings together."""
+
+    strength: Floats
+    """(P,) by one prior width [sigma]."""
+    steps: Floats
+    """(P,) for differences, in prior widths."""
+    gram: Floats
+    """(P, P) products of the changes; `strength` is the root of its diagonal."""
+
+    def felt(self, least: float, share: float) -> Ints:
+        """Parameters that move the recordings by more than `least` sigma.
+
+        Of hundreds: those that do so where the others cannot, and by this share of what all of them do.
+        """
+        if len(self.strength) < WORTH:
+            return np.flatnonzero(self.strength > least)
+        return independent(self.gram, max(least, share * float(np.linalg.norm(self.strength))))
+
+
+@dataclass(frozen=True)
 class Refined:
     """A maximum a posteriori with its local shape."""
 
@@ -55,15 +82,20 @@ class Refined:
     """(n, n) of free parameters, then launches, in units of the prior's standard deviations."""
     chi_square: float
     """Mean squared residual over what noise alone would leave; 1 = the noise floor."""
-    strength: Floats
-    """(P,) sigma by which one prior width of each parameter moves all recordings together, near the solution."""
+    influence: Influence
+    """Of each parameter near the solution."""
+
+    @property
+    def asked(self) -> Ints:
+        """Parameters that may be causes: all that move anything; of hundreds, those for which no other one stands."""
+        return self.fit.free if many(self.likelihood) else np.flatnonzero(self.influence.strength > 0)
 
 
 def refine(likelihood: Likelihood, values: Floats, watch: Watch = lambda *_: True) -> Refined:
     """Fit from the given (P,) values."""
     point = start(likelihood, values)
-    strength, steps = sensitivity(likelihood, point)
-    strong = np.flatnonzero(strength > STRONG)
+    first = sensitivity(some(likelihood), start(some(likelihood), values))
+    strong, steps = first.felt(STRONG, STRONG_SHARE), first.steps.copy()
     for i, share in enumerate(HORIZONS):
         part = likelihood.until(share * float(likelihood.time_s.max()))
         robust = max(ROBUST, 3.0 * typical_residual(part, point))
@@ -89,16 +121,27 @@ def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True)
 
     What is felt is asked here and not at the start, from where a puck may never have reached some wall.
     """
-    strength, steps = sensitivity(likelihood, point)
-    felt = np.flatnonzero(strength > FELT)
+    influence = sensitivity(likelihood, point)
+    felt = influence.felt(FELT, FELT_SHARE)
     robust = max(ROBUST, 3.0 * typical_residual(likelihood, point))
-    fit = minimise(likelihood, point, felt, 12, robust, tolerance=1.0, steps=steps[felt])
+    fit = minimise(likelihood, point, felt, 12, robust, tolerance=1.0, steps=influence.steps[felt])
     watch("refine", 0.85, fit.point)
     rough = with_roughness(likelihood, fit)
     linear = scaled(fit.linear, likelihood, rough)
     fit = minimise(rough, fit.point, felt, 8, ROBUST, tolerance=0.3, linear=linear)
     watch("refine", 1.0, fit.point)
-    return Refined(fit, rough, covariance(rough, fit), chi_square(rough, fit), strength)
+    spread = covariance(rough, fit)
+    if many(likelihood):
+        factor = np.ones(len(spread))
+        factor[: len(felt)] = coupling(influence.gram, felt, information_share(rough, fit))
+        spread = spread * np.outer(factor, factor)
+    return Refined(fit, rough, spread, chi_square(rough, fit), influence)
+
+
+def some(likelihood: Likelihood) -> Likelihood:
+    """Of hundreds of parameters the strongest are asked of every third recording: enough to begin with."""
+    episodes = len(likelihood.inputs)
+    return likelihood.of(np.arange(0, episodes, 3)) if many(likelihood) and episodes >= 2 * 3 else likelihood
 
 
 def covariance(likelihood: Likelihood, fit: Fit) -> Floats:
@@ -110,9 +153,13 @@ def covariance(likelihood: Likelihood, fit: Fit) -> Floats:
     """
     hessian, _ = normal_equations(likelihood, fit.point, fit.linear, fit.free, fit.robust)
     prior = np.eye(len(hessian))
+    return np.asarray(np.linalg.inv((hessian - prior) * information_share(likelihood, fit) + prior))
+
+
+def information_share(likelihood: Likelihood, fit: Fit) -> float:
+    """What is left of the recordings' information where frames repeat each other or the model does not explain them."""
     repeated = max(likelihood.correlation_time, residual_correlation_time(likelihood, fit))
-    share = 1 / (repeated * max(chi_square(likelihood, fit), 1.0))
-    return np.asarray(np.linalg.inv((hessian - prior) * share + prior))
+    return 1 / (repeated * max(chi_square(likelihood, fit), 1.0))
 
 
 def residual_correlation_time(likelihood: Likelihood, fit: Fit) -> float:
@@ -145,11 +192,16 @@ def scaled(linear: Linear, old: Likelihood, new: Likelihood) -> Linear:
     )
 
 
-def sensitivity(likelihood: Likelihood, point: Point) -> tuple[Floats, Floats]:
-    """(P,) sigma by which one prior width of each parameter moves all recordings; (P,) steps for differences."""
-    everything = np.arange(len(likelihood.parameters))
-    coarse = linearise(likelihood, point, everything, np.full(len(everything), 0.3))
-    return np.sqrt(np.sum(coarse.jacobian**2, axis=(0, 1, 2))), difference_steps(coarse)
+def sensitivity(likelihood: Likelihood, point: Point) -> Influence:
+    """Influence of every parameter at a point, from one coarse difference each."""
+    count = len(likelihood.parameters)
+    strength, steps, gram = np.zeros(count), np.ones(count), np.zeros((count, count))
+    asked = np.flatnonzero(acting(likelihood, point, COARSE))
+    coarse = linearise(likelihood, point, asked, np.full(len(asked), COARSE))
+    strength[asked], steps[asked] = np.sqrt(np.sum(coarse.jacobian**2, axis=(0, 1, 2))), difference_steps(coarse)
+    columns = coarse.jacobian.reshape(-1, len(asked))
+    gram[np.ix_(asked, asked)] = columns.T @ columns
+    return Influence(strength, steps, gram)
 
 
 def typical_residual(likelihood: Likelihood, point: Point) -> float:
@@ -193,6 +245,15 @@ def with_roughness(likelihood: Likelihood, fit: Fit, draws: int = 6) -> Likeliho
     spread = np.sqrt(np.mean(beyond**2, axis=0)) * likelihood.sigma
     grown = np.maximum.accumulate(spread, axis=1)  # roughness never heals
     return replace(likelihood, sigma=np.hypot(likelihood.sigma, grown))
+
+
+def fitted_launches(likelihood: Likelihood, values: Floats) -> Floats:
+    """(E, A) offsets of each episode's inputs that agree best with it, for (P,) values that stay as they are."""
+    point, nothing = start(likelihood, values), np.zeros(0, dtype=np.int64)
+    if not likelihood.launch_std.any():
+        return point.launch
+    robust = max(ROBUST, 3.0 * typical_residual(likelihood, point))
+    return minimise(likelihood, point, nothing, 12, robust, tolerance=1.0, fresh=False).point.launch
 
 
 def standard_errors(refined: Refined) -> tuple[Ints, Floats]:

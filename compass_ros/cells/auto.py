@@ -14,18 +14,19 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from compass_ros.cells.auto_rules import Candidate, candidates
+from compass_ros.cells.auto_rules import candidates
+from compass_ros.cells.candidate import Candidate
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.dynamics import Dynamics
 from compass_ros.cells.fields import OPTIONS, PLAIN, entry
+from compass_ros.cells.made_fields import TURNED
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.cells.spec import ParameterSpec
 from compass_ros.types import Floats
 
 Place = tuple[str, int]
 """An array of the model and a place in it, flattened."""
-_WRITES = {"geom_turn": "geom_quat", "body_turn": "body_quat", "servo_gain": "actuator_gainprm",
-           "command_scale": "actuator_gainprm"}  # fmt: skip
+_WRITES = TURNED | {"servo_gain": "actuator_gainprm", "command_scale": "actuator_gainprm"}
 """The array that a made field changes."""
 
 
@@ -64,7 +65,7 @@ def claimed(cell: Cell, dynamics: Dynamics, scene: mujoco.MjModel) -> set[Place]
         values = cell.defaults.copy()
         up = parameter.default + parameter.half_width
         values[i] = up if up <= parameter.high else parameter.default - parameter.half_width
-        taken |= set(_changed(scene, _applied(dynamics, values)))
+        taken |= set(changed(scene, _applied(dynamics, values)))
     return taken
 
 
@@ -74,7 +75,8 @@ def _applied(dynamics: Dynamics, values: Floats) -> mujoco.MjModel:
     return model
 
 
-def _changed(a: mujoco.MjModel, b: mujoco.MjModel) -> Iterator[Place]:
+def changed(a: mujoco.MjModel, b: mujoco.MjModel) -> Iterator[Place]:
+    """The numbers that differ between two models of a scene."""
     for array in PLAIN:
         before, after = np.ravel(getattr(a, array)), np.ravel(getattr(b, array))
         yield from ((array, int(place)) for place in np.flatnonzero(before != after))

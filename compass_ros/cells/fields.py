@@ -24,10 +24,12 @@ KINDS = {
     "geom": (_OBJECT.mjOBJ_GEOM, ("friction", "solref", "solimp", "size", "pos", "quat", "margin", "gap", "solmix",
                                   "condim", "fluid")),
     "body": (_OBJECT.mjOBJ_BODY, ("mass", "inertia", "ipos", "iquat", "pos", "quat", "gravcomp")),
-    "jnt": (_OBJECT.mjOBJ_JOINT, ("stiffness", "range", "margin", "solref", "solimp", "pos", "axis")),
-    "dof": (_OBJECT.mjOBJ_JOINT, ("damping", "armature", "frictionloss", "solref", "solimp")),
+    "jnt": (_OBJECT.mjOBJ_JOINT, ("stiffness", "stiffnesspoly", "range", "margin", "solref", "solimp",
+                                   "pos", "axis")),
+    "dof": (_OBJECT.mjOBJ_JOINT, ("damping", "dampingpoly", "armature", "frictionloss", "solref", "solimp")),
     "qpos": (_OBJECT.mjOBJ_JOINT, ("spring",)),
-    "actuator": (_OBJECT.mjOBJ_ACTUATOR, ("gainprm", "biasprm", "dynprm", "gear", "forcerange", "ctrlrange")),
+    "actuator": (_OBJECT.mjOBJ_ACTUATOR, ("gainprm", "biasprm", "dynprm", "gear", "damping", "armature",
+                                                 "forcerange", "ctrlrange")),
     "pair": (_OBJECT.mjOBJ_PAIR, ("friction", "solref", "solreffriction", "solimp", "margin", "gap", "dim")),
     "tendon": (_OBJECT.mjOBJ_TENDON, ("stiffness", "damping", "frictionloss", "armature", "lengthspring", "range")),
     "site": (_OBJECT.mjOBJ_SITE, ("pos", "quat")),
@@ -187,7 +189,7 @@ def prepare(model: mujoco.MjModel, used: set[str]) -> None:
         model.geom_sameframe[:] = 0
     if used & {"site_pos", "site_quat"}:
         model.site_sameframe[:] = 0
-    if used & {"body_ipos", "body_iquat"}:
+    if used & {"body_ipos", "body_iquat", "inertia_turn"}:
         model.body_sameframe[:] = 0
     if "geom_size" in used:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE  # its boxes are those of the default sizes

@@ -9,14 +9,16 @@ from compass_ros.cells.auto import with_auto
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.cells.spec import validated_spec
-from compass_ros.config import read_yaml
+from compass_ros.config import Parameters, read_yaml
 from compass_ros.errors import ConfigError, nearest
 
 _builtin = Path(__file__).parents[1] / "config" / "cells"
 
 
-def load(name_or_path: str | Path) -> Cell:
-    """A cell by its name in config/cells or by the path of its YAML.
+def load(name_or_path: str | Path, parameters: Parameters = "cell") -> Cell:
+    """A cell by its name in config/cells or by the path of its YAML, with its own parameters or all of its scene's.
+
+    Either way it is the same cell with the same hash: `auto` adds parameters at values that the scene has already.
 
     Raises ConfigError with one line: no such cell, not as expected, or with a scene or parameters that its dynamics
     cannot use.
@@ -35,7 +37,7 @@ def load(name_or_path: str | Path) -> Cell:
         raise ConfigError(f"{path}: model: no file {model}")
     cell = Cell(spec, path, hashlib.sha256(path.read_bytes() + model.read_bytes()).hexdigest()[:16])
     dynamics_of(cell)
-    return with_auto(cell) if spec.auto else cell
+    return with_auto(cell) if spec.auto or parameters == "auto" else cell
 
 
 def cells_folder() -> Path:

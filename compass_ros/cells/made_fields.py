@@ -4,6 +4,7 @@
 |---|---|---|
 | `body_mass` | body | the mass, and the inertia in proportion |
 | `geom_turn[axis]`, `body_turn[axis]` | geom, body | rotation [rad] about an axis of the parent, after the scene's |
+| `inertia_turn[axis]` | body | the same of the axes of its inertia, about an axis of the body |
 | `contact_solref[i]`, `contact_solimp[i]` | geom | a contact pair takes the mean of its two geoms |
 | `contact_friction[i]` | geom | the same for sliding (0), turning (1) and rolling (2) friction |
 | `servo_gain` | actuator | gain of a position or velocity servo: gainprm[0] and the bias that belongs to it |
@@ -47,6 +48,7 @@ ELEMENT = {
     "body_mass": "body",
     "body_turn": "body",
     "geom_turn": "geom",
+    "inertia_turn": "body",
     "contact_solref": "geom",
     "contact_solimp": "geom",
     "contact_friction": "geom",
@@ -54,6 +56,8 @@ ELEMENT = {
     "command_scale": "actuator",
 }
 """Kind of the element of each made field."""
+TURNED = {"geom_turn": "geom_quat", "body_turn": "body_quat", "inertia_turn": "body_iquat"}
+"""The quaternions that are turned."""
 
 
 def early_writers(scene: mujoco.MjModel, made: Sequence[Made]) -> list[Writer]:
@@ -64,7 +68,7 @@ def early_writers(scene: mujoco.MjModel, made: Sequence[Made]) -> list[Writer]:
 
 def late_writers(scene: mujoco.MjModel, made: Sequence[Made], where: str) -> list[Writer]:
     """Writers that go after the plain fields. Raises ConfigError."""
-    turns = [_turn(scene, name, made) for name in ("geom_turn", "body_turn") if any(m.name == name for m in made)]
+    turns = [_turn(scene, name, made) for name in TURNED if any(m.name == name for m in made)]
     commands = [_command(scene, m) for m in made if m.name == "command_scale"]
     return turns + _mixtures(scene, [m for m in made if m.name.startswith("contact_")], where) + commands
 
@@ -80,7 +84,7 @@ def _mass(scene: mujoco.MjModel, made: Made) -> Writer:
 
 
 def _turn(scene: mujoco.MjModel, name: str, made: Sequence[Made]) -> Writer:
-    array = name.replace("_turn", "_quat")
+    array = TURNED[name]
     own: dict[int, list[Made]] = {}
     for m in made:
         if m.name == name:

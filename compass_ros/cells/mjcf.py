@@ -179,7 +179,7 @@ def _compiled(cell: Cell) -> mujoco.MjModel:
 def _unsimplify(spec: mujoco.MjSpec, nominal: mujoco.MjModel, parameters: Sequence[ParameterSpec]) -> None:
     """Bodies whose inertial frame or joint's place is tuned: MuJoCo must not take their inertia matrix for diagonal."""
     for p in parameters:
-        if p.field.startswith(("body_ipos", "body_iquat")):
+        if p.field.startswith(("body_ipos", "body_iquat", "inertia_turn")):
             tuned = [one.strip() for one in p.of.split(",")]
         elif p.field.startswith(("jnt_pos", "jnt_axis")):
             found = [mujoco.mj_name2id(nominal, mujoco.mjtObj.mjOBJ_JOINT, one.strip()) for one in p.of.split(",")]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from compass_ros.commands.calibrate import Parameters
 from compass_ros.commands.progress import Bar
 
 if TYPE_CHECKING:
@@ -44,6 +45,9 @@ def bench(
     ] = None,
     missing: Annotated[float, typer.Option(min=0, max=0.9, help="share of the frames without an object")] = 0.0,
     start: Annotated[Start, typer.Option(help="first guess")] = Start.default,
+    parameters: Annotated[
+        Parameters, typer.Option(help="what is tuned: the cell's own list, or every tunable field of its scene too")
+    ] = Parameters.cell,
     ablations: Annotated[
         bool, typer.Option("--ablations", help="instead: N, M, lambda and first guesses varied one at a time")
     ] = False,
@@ -56,10 +60,13 @@ def bench(
     from compass_ros.bench.case import Case
     from compass_ros.bench.run import run_bench
 
-    if ablations and (noise or missing or start is not Start.default or (real, sim) != (10, 64)):
-        raise typer.BadParameter("it varies N, M and the first guess itself", param_hint="--ablations")
+    varied = start is not Start.default or parameters is not Parameters.cell or (real, sim) != (10, 64)
+    if ablations and (noise or missing or varied):
+        raise typer.BadParameter(
+            "it varies N, M and the first guess itself, of the cell's own parameters", param_hint="--ablations"
+        )
     if not table and not figures:
-        base = Case("", "", 0, iterations, real, sim, 0.0, missing, start.value)
+        base = Case("", "", 0, iterations, real, sim, 0.0, missing, start.value, parameters=parameters.value)
         cases = chosen(task or ["air_hockey"], method or ["default"], seeds, noise or [0.0], base, ablations)
         with Bar() as bar:
             ran = run_bench(cases, out, bar, threads)
@@ -77,7 +84,7 @@ def chosen(
     from compass_ros.cells import load
 
     for task in tasks:
-        load(task)
+        load(task, base.parameters)
     names = [name for given in methods for name in (METHODS if given == ALL else (find(given).name,))]
     unique = tuple(dict.fromkeys(names))
     if ablations:

@@ -29,6 +29,13 @@ class ProgressStyle(str, Enum):
     none = "none"
 
 
+class Parameters(str, Enum):
+    """What is tuned."""
+
+    cell = "cell"
+    auto = "auto"
+
+
 def add_to(app: typer.Typer) -> None:
     app.command()(calibrate)
 
@@ -38,6 +45,9 @@ def calibrate(
     cell: Annotated[str, typer.Option(help="name of a cell, or path of its YAML")] = "air_hockey",
     out: Annotated[Path, typer.Option(help="folder of the result")] = Path("out/calibration"),
     method: Annotated[str, typer.Option(help="default, compass, or a rival; see `compass bench --help`")] = "default",
+    parameters: Annotated[
+        Parameters, typer.Option(help="what is tuned: the cell's own list, or every tunable field of its scene too")
+    ] = Parameters.cell,
     seed: Annotated[int, typer.Option(min=0, help="decides which episodes are held out, and all random numbers")] = 0,
     rollouts: Annotated[int, typer.Option(min=0, help="most simulated rollouts; 0: the method's own budget")] = 0,
     held_out: Annotated[float, typer.Option(min=0, max=0.9, help="share of the episodes that is never fitted")] = 0.25,
@@ -46,17 +56,24 @@ def calibrate(
     progress: Annotated[ProgressStyle, typer.Option(help="how to show progress")] = ProgressStyle.bar,
 ) -> None:
     """Find which simulator parameters are wrong, what they should be, and what physics is missing."""
-    run(bags, cell, out, settings(method, seed, rollouts, held_out, discover, config), progress)
+    run(bags, cell, out, settings(method, seed, rollouts, held_out, discover, config, parameters), progress)
 
 
 def settings(
-    method: str, seed: int, rollouts: int, held_out: float, discover: bool, config: Path | None
+    method: str,
+    seed: int,
+    rollouts: int,
+    held_out: float,
+    discover: bool,
+    config: Path | None,
+    parameters: Parameters = Parameters.cell,
 ) -> Mapping[str, object]:
     """The configuration file's fields over the command line's."""
     from compass_ros.config import read_yaml
 
     given: dict[str, object] = {
         "method": method,
+        "parameters": parameters.value,
         "seed": seed,
         "rollouts": rollouts,
         "held_out_share": held_out,
@@ -83,8 +100,8 @@ def run(
     from compass_ros.results import make_writable, write_all
 
     started = time.monotonic()
-    cell = load(cell_name)
     validated = calibration_config(config, "command line")
+    cell = load(cell_name, validated.parameters)
     sources = [Source(o.topic or f"/puck_tracker/{o.name}/pose", o.name, o.quantity) for o in cell.objects]
     episodes = read_episodes(bags, sources, cell.name, cell.hash)
     make_writable(out)  # now, and not after minutes of work

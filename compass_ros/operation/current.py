@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from compass_ros.cells import Cell
+from compass_ros.cells.auto import with_auto
 from compass_ros.episodes import Source, find_bags, read_episode
 from compass_ros.reporting.result_json import read_result
 from compass_ros.simulation import Simulator
@@ -75,6 +76,9 @@ def current(cell: Cell, version: Path | None = None, threads: int = 0) -> Curren
         return Current(simulator, simulator.defaults)
     where = str(version / "result.json")
     rows = read_result(version / "result.json")["parameters"]
+    own = {p.name for p in cell.parameters}
+    if any(row["name"] not in own for row in rows):
+        cell = with_auto(cell)  # calibrated with `--parameters auto`
     values = cell.values({row["name"]: _inside(cell, row["name"], row["value"]) for row in rows}, where)
     if not (version / "effects.yaml").is_file():
         return Current(Simulator(cell, threads=threads), values)

@@ -119,18 +119,20 @@ def _at(steps: Floats, time: Floats, values: Floats) -> Floats:
 class Replay:
     """A simulator asked about recorded episodes. Both functions are batched over pairs (values, episode)."""
 
-    def __init__(self, simulator: Simulator, data: Recordings) -> None:
+    def __init__(self, simulator: Simulator, data: Recordings, launch: Floats | None = None) -> None:
+        """`launch`: (E, A) by how much each episode's true inputs differ from what was commanded or measured."""
         self.simulator = simulator
         self.data = data
+        self.inputs = data.inputs if launch is None else data.inputs + launch
 
     def predict(self, values: Floats, episode: Ints) -> Floats:
         """(B, F, C) what the tracker would have said at the recorded stamps, for (B, P) values and (B,) episodes."""
-        return self.simulator.observe(values, self.data.inputs[episode], self.data.time_s[episode])
+        return self.simulator.observe(values, self.inputs[episode], self.data.time_s[episode])
 
     def differences(self, values: Floats, episode: Ints) -> Floats:
         """(B, K) trajectory difference d_k: sum over the control steps of the 2-norm (types.Differences)."""
         steps = np.broadcast_to(self.data.steps_s, (len(values), len(self.data.steps_s)))
-        simulated = self.simulator.observe(values, self.data.inputs[episode], steps)
+        simulated = self.simulator.observe(values, self.inputs[episode], steps)
         return np.asarray(factor_distance(self.simulator.cell, simulated, self.data.at_steps[episode]).sum(axis=1))
 
     def gap(self, values: Floats) -> Gap:
@@ -139,18 +141,17 @@ class Replay:
         tiled = np.tile(values, (len(episodes), 1))
         d = self.differences(tiled, episodes).mean(axis=0)
         squared = (self.predict(tiled, episodes) - self.data.measured) ** 2
-        distance2 = np.concatenate(
-            [squared[:, :, list(columns)].sum(axis=2).ravel() for columns in _objects(self.simulator.cell)]
-        )
+        own = positions(self.simulator.cell).values()
+        distance2 = np.concatenate([squared[:, :, list(columns)].sum(axis=2).ravel() for columns in own])
         names = [f.name for f in self.simulator.cell.factors]
         return Gap(dict(zip(names, d.tolist(), strict=True)), float(np.sqrt(np.nanmean(distance2))))
 
 
-def _objects(cell: Cell) -> list[range]:
-    """Position columns of each object."""
-    out, column = [], 0
+def positions(cell: Cell) -> dict[str, range]:
+    """Columns of an observation that hold the position of each object (a joint's: its angle), orientations left out."""
+    out, column = {}, 0
     for spec in cell.objects:
         size = QUANTITY_SIZE[spec.quantity]
-        out.append(range(column, column + min(size, 3)))
+        out[spec.name] = range(column, column + min(size, 3))
         column += size
     return out

@@ -32,6 +32,26 @@ def test_a_grid_has_each_combination_once_and_a_key_tells_cases_apart() -> None:
     assert Case(**json.loads(json.dumps(cases[3].__dict__))).key == cases[3].key
 
 
+def test_every_field_of_the_scene_is_a_case_of_its_own(tmp_path: Path) -> None:
+    """The same shots and truth, more to find; a line without the choice is one of the cell's own parameters."""
+    auto = replace(TINY, parameters="auto")
+    assert auto.key != TINY.key
+    assert auto.setting().endswith("parameters=auto")
+    assert grid(["air_hockey"], ["random"], [0], [0.0], auto) == (auto,)
+    few, many = build(TINY), build(auto)
+    assert len(many.problem.parameters) >= 400
+    assert many.causal == few.causal
+    assert np.array_equal(many.truth[:64], few.truth)
+    assert np.array_equal(many.truth[64:], many.problem.start[64:])
+    assert np.abs(many.problem.measured - few.problem.measured).max() < 1e-9
+    assert run_bench((TINY, auto), tmp_path) == 2
+    assert run_bench((auto, TINY), tmp_path) == 0
+    older = [json.loads(line) for line in (tmp_path / RESULTS).read_text().splitlines()][:1]
+    del older[0]["case"]["parameters"]
+    assert case_of(older[0]) == TINY
+    assert "### air_hockey: iterations=2, real=2, sim=2, parameters=auto" in tables(read(tmp_path / RESULTS))
+
+
 def test_ablations_vary_one_thing_at_a_time() -> None:
     cases = ablations("air_hockey", ["compass"], [0])
     assert len(cases) == len(set(cases))
@@ -148,6 +168,7 @@ def _row(case: Case, difference: float) -> dict[str, object]:
         "edges": {"kept": 2, "precision": 1.0, "recall": None, "missed": [], "extra": []},
         "rollouts": 20,
         "rollouts_counted_by_simulator": 20,
+        "simulated_seconds": 50.0,
         "wall_seconds": 1.5,
         "trace": [step, step | {"rollouts": 20, "difference": [0.5, difference / 2]}],
     }
@@ -158,6 +179,8 @@ def test_tables_have_means_over_seeds_and_the_papers_number() -> None:
     rows.append(_row(Case("air_hockey", "npdr", 0), 0.5))
     lines = tables(rows).splitlines()
     assert lines[0] == "### air_hockey"
+    assert lines[2].endswith("| rollouts | simulated [s] | wall [s] |")
+    assert lines[4].endswith("| 20 | 50 | 1.5 |")
     assert lines[4].startswith("| npdr | 1 | 0.2 | 0.29 |")  # the smaller difference first
     assert lines[5].startswith("| compass | 3 | 0.2 ± 0 | 0.22 | - (0.0) | 2 ± 1 | 0.5 ± 0.25 |")
 

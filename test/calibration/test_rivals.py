@@ -110,6 +110,16 @@ def test_least_squares_gives_the_planted_truth_and_honest_deviations() -> None:
     assert np.all(found.std < 0.05)
 
 
+def test_least_squares_is_not_hindered_by_recordings_without_noise() -> None:
+    """Its regularizer has absolute limits, so its residual must not be in units of a vanishing noise."""
+    meter = Meter(planted(3, 3, episodes=6, seed=2))
+    given = meter.problem
+    rough = METHODS["mujoco-sysid"].run(given, SMALL, 0, silent)
+    exact = METHODS["mujoco-sysid"].run(replace(given, weight=given.weight * 1e7), SMALL, 0, silent)
+    assert exact.rollouts == rough.rollouts
+    np.testing.assert_allclose(exact.values, rough.values, rtol=1e-9)
+
+
 def test_an_unknown_method_names_the_nearest() -> None:
     with pytest.raises(ConfigError, match=r"unknown method 'cma'; available: .*did you mean 'cma-es'\?"):
         method("cma")

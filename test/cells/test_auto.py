@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 from compass_ros.cells import Cell, load
-from compass_ros.cells.auto import at_defaults, automatic, claimed, with_auto
-from compass_ros.cells.fields import PLAIN
+from compass_ros.cells.auto import at_defaults, automatic, changed, claimed, with_auto
+from compass_ros.cells.fields import PLAIN, Fields
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.simulation import Simulator
 from test.cells.written import PENDULUM, content, parameter, written
 
+MANY = {"air_hockey": 400, "bouncing_ball": 250, "push_i": 250}
+"""At least so many parameters of a scene, the cell's own among them."""
 BUILT_IN = ("air_hockey", "bouncing_ball", "push_i")
 
 
@@ -100,3 +102,45 @@ def test_names_that_exist_get_a_second_part() -> None:
     names = [p.name for p in automatic(model, set(), {"arm2@dyna@mass"})]
     assert "arm2@dyna@mass" not in names
     assert "arm2@dyna@mass_body_mass" in names
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_the_replayed_scenes_have_hundreds_of_fields(name: str) -> None:
+    cell = load(name, "auto")
+    assert len(cell.parameters) >= MANY[name]
+    assert cell.hash == load(name).hash, "bags of the cell are its bags"
+    assert cell.parameters == with_auto(load(name)).parameters
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_every_one_changes_the_model(name: str) -> None:
+    """Hand-made parameters may act outside of it; what was found in the scene is a number of the scene."""
+    own, extended = load(name), load(name, "auto")
+    dynamics = dynamics_of(extended)
+    written = Fields(dynamics.model, list(enumerate(extended.spec.parameters))[len(own.parameters) :], name)
+    moved, base = copy.copy(dynamics.model), copy.copy(dynamics.model)
+    written.write([base], extended.defaults[None])
+    for i in range(len(own.parameters), len(extended.parameters)):
+        values = extended.defaults.copy()
+        values[i] += extended.parameters[i].half_width
+        written.write([moved], values[None])
+        assert any(True for _ in changed(base, moved)), extended.parameters[i].name
+
+
+def test_air_a_force_that_the_drive_adds_and_drag_with_the_square_of_speed() -> None:
+    """Three of the fields that the scene leaves at zero, against what their physics says."""
+    cell = load("air_hockey", "auto")
+    names = [p.name for p in cell.parameters]
+    simulator = Simulator(cell, threads=1)
+    action = np.tile([-0.225, 0.075, 0.0, 0.45], (4, 1))
+    values = np.tile(cell.defaults, (4, 1))
+    for row, name in enumerate(
+        ("env@dyna@air_density", "puck1_x@dyna@joint_damping_2", "pusher_vx@actuation@offset"), 1
+    ):
+        parameter = cell.parameters[names.index(name)]
+        assert parameter.default == 0.0
+        values[row, names.index(name)] = parameter.high
+    seen = simulator.observe(values, action, np.tile([[0.3, 0.9]], (4, 1)))
+    travelled = seen[:, 1, 0] - seen[:, 0, 0]
+    assert (travelled[1:3] < travelled[0] - 1e-6).all(), "air and drag slow puck 1"
+    assert abs(seen[3, 1, 0] - seen[0, 1, 0]) > 1e-4, "a drive that pushes by itself strikes harder"

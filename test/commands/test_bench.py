@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,8 @@ def test_names_of_methods_are_settled_so_that_a_case_has_one_key() -> None:
     assert {c.method for c in cases} == {"causal-map", "random"}
     assert len(cases) == 2 * 2 * 2
     assert {(c.iterations, c.real, c.sim, c.missing, c.start) for c in cases} == {(3, 5, 8, 0.2, "random")}
+    auto = chosen(["air_hockey"], ["random"], 1, [0.0], replace(BASE, parameters="auto"), ablations=False)
+    assert {c.parameters for c in auto} == {"auto"}
     every = chosen(["air_hockey", "push_i"], ["all"], 1, [0.0], BASE, ablations=False)
     assert {c.method for c in every} == set(METHODS)
     assert {c.task for c in every} == {"air_hockey", "push_i"}
@@ -71,4 +74,6 @@ def test_bad_input_is_one_line(words: tuple[str, ...], said: str, run: Run, tmp_
 
 def test_ablations_beside_what_they_vary_is_wrong_use(run: Run, tmp_path: Path) -> None:
     assert run("bench", "--ablations", "--real", 5, "--out", tmp_path)[0] == 2
+    assert run("bench", "--ablations", "--parameters", "auto", "--out", tmp_path)[0] == 2
+    assert run("bench", "--parameters", "all", "--out", tmp_path)[0] == 2
     assert run("bench", "--seeds", 0, "--out", tmp_path)[0] == 2

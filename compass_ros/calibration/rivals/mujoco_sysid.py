@@ -1,8 +1,10 @@
 """What `mujoco.sysid` does once the residual is built: `mujoco.minimize.least_squares` on whole trajectories.
 
 `mujoco.sysid.optimize` hands its residual function to this solver by default; the residual here is the same one
-(predicted minus measured at the recorded stamps, over the noise), from the batched simulator instead of a list of
-models.
+(predicted minus measured at the recorded stamps, each channel over the norm of what was measured, as sysid's
+`normalize_residual` does), from the batched simulator instead of a list of models. Not over the noise: the solver's
+regularizer ends at an absolute 1e8, which is nothing beside a Hessian of residuals in units of a micrometre. No
+restarts: sysid has none.
 """
 
 from __future__ import annotations
@@ -38,6 +40,8 @@ def mujoco_sysid(problem: Problem, allowance: Allowance, seed: int, report: Repo
     episodes, limit = len(problem.actions), allowance.rollouts
     record.measure(start)
 
+    scale = _normalised(problem)[:, None]
+
     def residual(columns: Floats) -> Floats:
         """(P, B) -> (R, B)."""
         if record.rollouts + columns.shape[1] * episodes > limit or record.cancelled:
@@ -45,7 +49,7 @@ def mujoco_sysid(problem: Problem, allowance: Allowance, seed: int, report: Repo
         values = problem.low + width * columns.T
         record.spend(len(values) * episodes)
         record.proceed(record.rollouts / limit)
-        return problem.residuals(values).T
+        return problem.residuals(values).T * scale
 
     bounds = [np.zeros(len(start)), (problem.high - problem.low) / width]
     seen: list[minimize.IterLog] = []
@@ -71,6 +75,14 @@ def mujoco_sysid(problem: Problem, allowance: Allowance, seed: int, report: Repo
     except _SpentError:
         reason = "the allowance is spent"
     return record.estimate(reason, std=_deviations(seen, width))
+
+
+def _normalised(problem: Problem) -> Floats:
+    """(E F C) factors that bring weighted residuals to sysid's: sqrt(2) over the norm of a channel in its episode."""
+    seen = problem.weight > 0
+    norm = np.linalg.norm(np.where(seen, problem.measured, 0.0), axis=1, keepdims=True)  # (E, 1, C)
+    factor = np.sqrt(2.0) / np.maximum(norm, 1e-12)
+    return np.asarray(np.where(seen, factor / np.where(seen, problem.weight, 1.0), 0.0).ravel())
 
 
 def _deviations(log: list[minimize.IterLog], width: Floats) -> Floats:

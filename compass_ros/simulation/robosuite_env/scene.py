@@ -19,11 +19,11 @@ GRIP = "compass_grip"
 _STIFF = (0.004, 1.0)
 """solref of the grip: as stiff as a time step of 1 ms allows with a margin of two."""
 _ROWS = {
-    "geom": ("pos", "quat", "size", "rbound", "aabb", "friction", "solref", "solimp", "margin", "gap", "condim",
-             "fluid", "sameframe"),
+    "geom": ("pos", "quat", "size", "rbound", "aabb", "friction", "solref", "solimp", "margin", "gap", "solmix",
+             "condim", "fluid", "sameframe"),
     "body": ("pos", "quat", "mass", "inertia", "ipos", "iquat", "sameframe"),
-    "jnt": ("stiffness", "range", "pos", "axis"),
-    "dof": ("damping", "armature", "frictionloss"),
+    "jnt": ("stiffness", "stiffnesspoly", "range", "pos", "axis"),
+    "dof": ("damping", "dampingpoly", "armature", "frictionloss"),
     "pair": ("friction", "solref", "solreffriction", "solimp", "margin", "gap", "dim"),
 }  # fmt: skip
 """Arrays of a model that parameters may change, by kind of element."""
