@@ -76,11 +76,13 @@ setup(
         "opencv-python",
         "openpyxl",
         "pydantic>=2",
+        "pysindy<2",  # 2 wants numpy 2, which mink, and so robosuite, does not take
         "pyyaml",
         "rich",
         "robosuite",
         "rosbags",
         "sbi",
+        "scikit-learn<1.8",  # pysindy 1.7 calls what 1.8 took away
         "scipy",
         "torch",
         "typer",

@@ -17,6 +17,7 @@ from compass_ros.commands import (
     real,
     record,
     report,
+    rivals,
     track,
     unseal,
 )
@@ -29,7 +30,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="What went wrong with my simulator? Calibrate it from recordings, and find the physics that it lacks.",
 )
-for module in (demo, plan, track, record, calibrate, diagnose, report, conceal, unseal, prove, bench, real, tables):
+for module in (demo, plan, track, record, calibrate, diagnose, report):
+    module.add_to(app)
+for module in (conceal, unseal, prove, rivals, bench, real, tables):
     module.add_to(app)
 
 

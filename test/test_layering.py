@@ -21,6 +21,7 @@ JOINS = {
     "operation": 3,
     "concealed": 3,
     "bench": 4,
+    "rivals": 4,
     "real": 4,
     "demo": 4,
     "commands": 5,
@@ -34,6 +35,7 @@ LAYERS = {"types": 0, "errors": 0, "config": 1, **dict.fromkeys(STEPS, 2), **JOI
 HOMES = {
     ("mujoco", "robosuite"): {"simulation", "cells", "concealed"},
     ("torch",): {"calibration", "policy"},
+    ("pysindy", "sklearn"): {"rivals"},
     ("cv2",): {"tracking"},
     ("rosbags", "mcap", "mcap_ros2"): {"episodes"},
     ("rclpy", "launch", "launch_ros", "ament_index_python", "rcl_interfaces", "action_msgs"): {"nodes"},

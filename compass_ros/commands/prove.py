@@ -28,6 +28,8 @@ def prove(
     first_seed: Annotated[int | None, typer.Option(min=0, help="seed of the first world; else the suite's own")] = None,
     table: Annotated[bool, typer.Option("--table", help="only print the table of the results that are there")] = False,
     page: Annotated[Path | None, typer.Option(help="Markdown file whose table is replaced")] = None,
+    rivals: Annotated[bool, typer.Option("--rivals", help="the same worlds through other methods instead")] = False,
+    rivals_out: Annotated[Path, typer.Option(help="what those say, one line a world")] = Path("proof/rivals.jsonl"),
 ) -> None:
     """Conceal, calibrate blindly, unseal, count. A run that was stopped goes on where it was."""
     from compass_ros.concealed.proof import lines
@@ -41,13 +43,24 @@ def prove(
     for name in suites:
         if name not in SUITES:
             raise ConfigError(f"unknown suite '{name}'; known: {', '.join(SUITES)}{nearest(name, SUITES)}")
-    if not table:
+    if rivals and not table:
+        from compass_ros.concealed.proof import rivals as others
+
+        plan = Plan(suites, worlds, others.METHOD, first_seed, others.PARTS)
+        campaign(plan, rivals_out, jobs, _tell_rivals, others.in_processes(threads))
+    elif not table:
         campaign(Plan(suites, worlds, method, first_seed), out, jobs, _tell, in_processes(threads))
     found = list(lines.read(out).values())
     for (name, by), among in groups(found).items():
         _print(f"{name}, method {by}: {len(among)} worlds", among)
+    theirs = list(lines.read(rivals_out).values())
+    _print_rivals(theirs, found)
     if page:
         write_page(page, found)
+    if page and theirs:
+        from compass_ros.concealed.proof import rivals_table
+
+        rivals_table.write_page(page, theirs, found)
 
 
 def _tell(key: Key, line: Line, done: int, total: int) -> None:
@@ -61,6 +74,32 @@ def _tell(key: Key, line: Line, done: int, total: int) -> None:
         text = f"FAILED {line['error']}"
     seconds = (line.get("seconds") or {}).get("calibrate", 0.0)
     typer.echo(f"[{done}/{total}] {key.suite} {key.seed}  {seconds:.0f} s  {text}")
+
+
+def _tell_rivals(key: Key, line: Line, done: int, total: int) -> None:
+    truth = " + ".join(line.get("truth", ())) or "nothing"
+    said = [
+        f"{n}: {', '.join(r['names']) or 'nothing'}"
+        for n, r in line.get("rivals", {}).items()
+        if r["names"] is not None
+    ]
+    said += [f"{n}: p = {r['p_value']:.3f}" for n, r in line.get("rivals", {}).items() if r["p_value"] is not None]
+    seconds = (line.get("seconds") or {}).get("rivals", 0.0)
+    text = f"FAILED {line['error']}" if line["error"] else "; ".join(said)
+    typer.echo(f"[{done}/{total}] {key.suite} {key.seed}  {seconds:.0f} s  true: {truth}; {text}")
+
+
+def _print_rivals(theirs: list[Line], ours: list[Line]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from compass_ros.concealed.proof.rivals_table import HEAD, by_suite, rows
+
+    for suite, among in by_suite(theirs).items():
+        shown = Table(*HEAD, title=f"{suite}: {len(among)} worlds through other methods")
+        for row in rows(among, ours):
+            shown.add_row(*row)
+        Console().print(shown)
 
 
 def _print(title: str, among: list[Line]) -> None:

@@ -94,6 +94,13 @@ def compare(result: Json, answer: Json) -> Comparison:
     )
 
 
+def judge_names(names: Sequence[str], answer: Json) -> tuple[bool, bool]:
+    """Whether bare names are what these recordings deserve, and whether one of them is not in any true class."""
+    classes = [{str(e["name"]), *e["twins"]} for e in answer["effects"] if not e["outside"]]
+    right = _right(str(answer["kind"]), "named" if names else "none", [{name} for name in names], classes)
+    return right, bool(set(names) - set().union(*classes))
+
+
 def _right(kind: str, verdict: str, sets: Sequence[set[str]], classes: Sequence[set[str]]) -> bool:
     """One effect: the truth is among what is said, and nothing is said that is not in its class."""
     if kind == "none":

@@ -27,6 +27,8 @@ class Plan:
     method: str = "default"
     first_seed: int | None = None
     """None: the suite's own."""
+    parts: tuple[str, ...] | None = None
+    """Of the package: whose change makes a line stale. None: those of our own method."""
 
     def worlds_to_prove(self) -> list[Key]:
         """In an order in which a run that is stopped has some of each suite."""
@@ -43,7 +45,7 @@ def prove(plan: Plan, path: Path, jobs: int, tell: Tell, run_world: RunWorld) ->
     """Run what is missing or by an older method, `jobs` worlds at a time; the file is whole after each of them."""
     known = lines.read(path)
     made_by = {
-        "method_sources": lines.sources(lines.METHOD),
+        "method_sources": lines.sources(lines.METHOD if plan.parts is None else plan.parts),
         "world_sources": lines.sources(lines.WORLDS),
         "commit": commit(),
     }

@@ -48,14 +48,14 @@ def run(suite: Suite, seed: int, method: str, threads: int) -> dict[str, object]
         world, answers, out = root / "world", root / "answers", root / "result"
         began = time.monotonic()
         conceal = ["conceal", "--seed", str(seed), "--out", str(world), "--answers", str(answers), *suite.options]
-        error = _call([sys.executable, "-m", "compass_ros.cli", *conceal], root)
+        error = call([sys.executable, "-m", "compass_ros.cli", *conceal], root)
         concealed = time.monotonic()
         if error:
             return {"error": f"conceal: {error}"}
         (root / "config.json").write_text(json.dumps({"threads": threads}), encoding="utf-8")
         given = ["--method", method, "--config", str(root / "config.json"), "--progress", "none", "--out", str(out)]
         blind = [sys.executable, "-m", "compass_ros.concealed.blind", str(answers), "calibrate", str(world), *given]
-        error = _call(blind, root)
+        error = call(blind, root)
         seconds = {"conceal": round(concealed - began, 2), "calibrate": round(time.monotonic() - concealed, 2)}
         opened = unseal(world, answers)
         if error:
@@ -84,7 +84,7 @@ def _effects(answer: Mapping[str, object]) -> list[Mapping[str, object]]:
     return effects
 
 
-def _call(command: list[str], folder: Path) -> str:
+def call(command: list[str], folder: Path) -> str:
     """Run to the end; what went wrong as one line, empty where nothing did. One thread for linear algebra."""
     quiet = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     try:

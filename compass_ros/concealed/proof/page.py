@@ -59,12 +59,17 @@ def _wrong(among: Sequence[Line]) -> str:
 
 def write_page(path: Path, found: Iterable[Line]) -> None:
     """Replace what stands between the markers. Raises ConfigError where the page has none."""
+    replace_between(path, BEGIN, END, markdown(found))
+
+
+def replace_between(path: Path, begin: str, end: str, content: str) -> None:
+    """Replace what stands between two markers of a text file. Raises ConfigError where it has none."""
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise ConfigError(f"{path}: expected the markers {BEGIN} and {END}")
-    write_text(path, f"{before}{BEGIN}\n{markdown(found)}{END}{after}")
+    before, first, rest = text.partition(begin)
+    _, last, after = rest.partition(end)
+    if not first or not last:
+        raise ConfigError(f"{path}: expected the markers {begin} and {end}")
+    write_text(path, f"{before}{begin}\n{content}{end}{after}")
