@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
-import mujoco
 import numpy as np
 
 from compass_ros.calibration.least_squares import Fit, normal_equations
@@ -12,6 +11,7 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.joint import Joint
 from compass_ros.discovery.screen import Space
 from compass_ros.simulation import Simulator
+from compass_ros.simulation.numerics import other_numerics
 from compass_ros.types import Floats
 
 MOSTLY = 0.5
@@ -24,26 +24,11 @@ def numerical_cause(space: Space, excess: float) -> str:
     The calibrated simulator plays the fitted episodes again with other numerics. What that moves, less what the
     parameters could take, is taken as it is, with amplitude one: physics has no business in it.
     """
-    for what, options in _others(space.simulator):
+    for what, options in other_numerics(space.simulator):
         share = _gain(space, options) / max(excess, 1e-9)
         if share > MOSTLY:
             return f"{100 * min(share, 1.0):.0f} % of what is left goes away with {what}"
     return ""
-
-
-def _others(simulator: Simulator) -> Iterator[tuple[str, Mapping[str, float]]]:
-    option = simulator.options
-    yield f"half the time step ({500 * option.timestep:g} ms)", {"timestep": 0.5 * option.timestep}
-    pyramid, cone = mujoco.mjtCone.mjCONE_PYRAMIDAL, mujoco.mjtCone.mjCONE_ELLIPTIC
-    if option.cone == pyramid:
-        yield "an elliptic friction cone", {"cone": int(cone)}
-    else:
-        yield "a pyramidal friction cone", {"cone": int(pyramid)}
-    newton, gradient = mujoco.mjtSolver.mjSOL_NEWTON, mujoco.mjtSolver.mjSOL_CG
-    if option.solver == newton:
-        yield "the conjugate-gradient solver", {"solver": int(gradient)}
-    else:
-        yield "Newton's solver", {"solver": int(newton)}
 
 
 def shift(joint: Joint) -> Floats:
