@@ -31,6 +31,8 @@ FORM_LEFT = 0.25
 """Part of what one effect leaves that a second may leave to be its cause."""
 OF_LIMIT = 8.0
 """Log evidence by which an effect must surpass what it comes to at an end of its shapes."""
+LEADS = 0.6
+"""Share from which the best effect is surely one of two; below, the second best may be instead."""
 TRIED = 6
 """Names that are fitted at once, the most promising first; as many again where none of them is enough."""
 PROMISING = 0.1
@@ -162,7 +164,10 @@ def choose(space: Space, scores: Sequence[Score], candidates: Sequence[Candidate
             return _with_second(Choice((first, *others), None, base - floor, floor), candidates, unseen)
     if not singles:
         return Choice((), None, base - floor, floor)
-    pair = _second(singles[0], singles, candidates)
+    different = _different(singles)
+    clear = choice.share(different[0]) > LEADS
+    firsts = different[:1] if clear else [different[0], *(converge(j, 4) for j in different[1:2])]
+    pair = _second(firsts, candidates)
     if pair and pair.fit.point.cost < cheapest.fit.point.cost:
         floor = floor_of(pair.likelihood, pair.fit, pair.fit.point.cost)
     return Choice(tuple(singles), pair, base - floor, floor)
@@ -185,7 +190,7 @@ def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOu
     first = choice.singles[0]
     if 1 - choice.share(first) < NEEDED:
         return choice
-    pair = _second(first, [first], candidates)
+    pair = _second([first], candidates)
     if pair is None:
         return choice
     floor = floor_of(pair.likelihood, pair.fit, pair.fit.point.cost)
@@ -243,20 +248,19 @@ def _promising(scores: Sequence[Score]) -> list[Score]:
     return out
 
 
-def _second(best: Joint, singles: Sequence[Joint], candidates: Sequence[Candidate]) -> Joint | None:
-    """The best single effects, each with the candidate that explains most of what it leaves."""
+def _second(firsts: Sequence[Joint], candidates: Sequence[Candidate]) -> Joint | None:
+    """Some fits of one effect, each with the candidates that promise most of what it leaves: the best pair."""
     found: list[Joint] = []
-    for first in _different(singles)[:2]:
-        done = first if first is best else converge(first, 4)
-        pushes = impulses(done.simulator, done.likelihood, done.fit)
-        there = Space(done.simulator, done.likelihood, done.fit, pushes)
+    for first in firsts:
+        pushes = impulses(first.simulator, first.likelihood, first.fit)
+        there = Space(first.simulator, first.likelihood, first.fit, pushes)
         own = {a.effect.name for a in first.added}
         scores = [score(there, c) for c in candidates if c.name not in own]
-        for s in _promising(scores)[:2]:
-            joint = fit_jointly(there, [s], 8)
+        for s in next(_rounds(scores), []):
+            joint = fit_jointly(there, [s], 4, tolerance=2.0)
             found.append(Joint(joint.simulator, joint.likelihood, joint.fit, (*first.added, *joint.added)))
-    found.sort(key=_worth)
-    return converge(found[0]) if found else None
+    best = sorted((further(j) for j in sorted(found, key=_worth)[:3]), key=_worth)
+    return converge(best[0]) if best else None
 
 
 def _different(singles: Sequence[Joint]) -> list[Joint]:

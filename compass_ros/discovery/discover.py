@@ -114,7 +114,7 @@ def discover(
     undetectable = plan_of(information(space, asked)).undetectable
     before = residual_map(space)
     tell("screen effects", 0.3)
-    found = Finding(simulator, refined, judge, noise, null, undetectable, before, seed, warnings)
+    found = Finding(simulator, space, refined, judge, noise, null, undetectable, before, seed, warnings)
     if not _something(space, scores, null, noise):
         return found.none(scores)
     excess = smooth_excess(space.likelihood, space.fit.point, space.fit.robust)
@@ -127,13 +127,13 @@ def discover(
     again = _restarted(refined, choice, simulator)
     if again is not None:  # the plain simulator does better than it was thought to: begin again from there
         space, scores = _screen(simulator, again, asked)
-        found = replace(found, refined=again, null=simulate_null(space, scores, noise, seed))
+        found = replace(found, space=space, refined=again, null=simulate_null(space, scores, noise, seed))
         if not _something(space, scores, found.null, noise):
             return found.none(scores)
         unseen = held_out(judge, space)
         choice = choose(space, scores, asked, unseen)
     tell("weigh effects", 0.9)
-    return found.judged(space, choice, unseen)
+    return found.judged(choice, unseen)
 
 
 def _screen(simulator: Simulator, refined: Refined, asked: Sequence[Candidate]) -> tuple[Space, list[Score]]:
@@ -171,6 +171,7 @@ class Finding:
     """What is known when the verdict is due."""
 
     simulator: Simulator
+    space: Space
     refined: Refined
     judge: Likelihood
     noise: Noise
@@ -199,7 +200,7 @@ class Finding:
         mismatch = Mismatch("fit_failed", None, (), self.undetectable, "", sentence)
         return Discovery(mismatch, before=self.before, warnings=self.warnings)
 
-    def judged(self, space: Space, choice: Choice, unseen: HeldOut) -> Discovery:
+    def judged(self, choice: Choice, unseen: HeldOut) -> Discovery:
         """Named, ambiguous, unknown or failed."""
         best = choice.singles[0] if choice.singles else None
         if choice.two and choice.pair is not None:
@@ -210,7 +211,7 @@ class Finding:
         both = pair is not None and best is not None and choice.share(pair) - choice.share(best) > NEEDED
         if pair is not None and both and choice.enough(pair) and unseen.helps(pair):
             return self.named(pair, choice, ((), ()))
-        return self.unknown(space, choice)
+        return self.unknown(choice)
 
     def named(self, joint: Joint, choice: Choice, equal: tuple[tuple[Joint, ...], ...]) -> Discovery:
         """One or two effects with values, errors and evidence."""
@@ -242,12 +243,12 @@ class Finding:
         mismatch = Mismatch(verdict, where, tuple(findings), self.undetectable, following, sentence)
         return self._with(joint, mismatch, choice, std)
 
-    def unknown(self, space: Space, choice: Choice) -> Discovery:
+    def unknown(self, choice: Choice) -> Discovery:
         """Something is there that no known effect explains; a formula is proposed where one predicts."""
-        where, sure = whereabouts(space, choice)
+        where, sure = whereabouts(self.space, choice)
         if not sure and not choice.singles:
             return self.failed("No verdict: the fit did not reach the noise floor and no place stands out.")
-        proposal: Proposal | None = propose(space, self.judge)
+        proposal: Proposal | None = propose(self.space, self.judge)
         sentence = f"{place(where)}, something differs that no known effect explains"
         if choice.singles:
             best = choice.singles[0]
@@ -260,9 +261,7 @@ class Finding:
 
     def _with(self, joint: Joint, mismatch: Mismatch, choice: Choice, std: Floats) -> Discovery:
         cell = len(self.simulator.cell.parameters)
-        base = self.refined.fit
-        pushes = impulses(self.simulator, self.refined.likelihood, base)
-        after = residual_map(Space(self.simulator, self.refined.likelihood, base, pushes), joint.fit.linear.residual)
+        after = residual_map(self.space, joint.fit.linear.residual)
         return Discovery(
             mismatch,
             joint.simulator,
