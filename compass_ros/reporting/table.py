@@ -28,7 +28,7 @@ STYLE: Mapping[Level, str] = {"good": "bold green", "note": "dim", "care": "bold
 
 
 # Every name of the cells fits into 80 columns.
-NARROW: Mapping[str, Any] = {"box": box.MINIMAL_HEAVY_HEAD, "pad_edge": False}
+NARROW: Mapping[str, Any] = {"box": box.MINIMAL_HEAVY_HEAD, "pad_edge": False, "show_edge": False}
 
 
 def print_result(result: Result, truth: Mapping[str, float] | None = None, console: Console | None = None) -> None:
