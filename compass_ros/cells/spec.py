@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as validated
 
 from compass_ros.cells.start import ReleaseSpec, StartSpec
-from compass_ros.errors import ConfigError, nearest
+from compass_ros.errors import ConfigError, nearest, shown
 from compass_ros.types import Quantity
 
 _strict = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -110,7 +110,7 @@ def validated_spec(content: Mapping[str, object], where: str) -> CellSpec:
         specs = (CellSpec, ParameterSpec, ActionSpec, ObjectSpec, FactorSpec, StartSpec, ReleaseSpec)
         known = [f.name for spec in specs for f in fields(spec)]
         hint = nearest(name.rsplit(".", 1)[-1], known) if first["type"] == _UNKNOWN else ""
-        raise ConfigError(f"{where}: {name}: {first['msg']}, found {str(first['input'])[:80]!r}{hint}") from error
+        raise ConfigError(f"{where}: {name}: {first['msg']}, found {shown(first['input'])}{hint}") from error
     _check_values(spec, where)
     _check_names(spec, where)
     return spec

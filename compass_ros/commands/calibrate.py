@@ -51,12 +51,13 @@ def calibrate(
     seed: Annotated[int, typer.Option(min=0, help="decides which episodes are held out, and all random numbers")] = 0,
     rollouts: Annotated[int, typer.Option(min=0, help="most simulated rollouts; 0: the method's own budget")] = 0,
     held_out: Annotated[float, typer.Option(min=0, max=0.9, help="share of the episodes that is never fitted")] = 0.25,
+    episodes: Annotated[int, typer.Option(min=1, help="most episodes to use; of more, an even choice")] = 100,
     config: Annotated[Path | None, typer.Option(help="YAML with any field of the configuration")] = None,
     discover: Annotated[bool, typer.Option(help="look for missing physics after the calibration")] = True,
     progress: Annotated[ProgressStyle, typer.Option(help="how to show progress")] = ProgressStyle.bar,
 ) -> None:
     """Find which simulator parameters are wrong, what they should be, and what physics is missing."""
-    run(bags, cell, out, settings(method, seed, rollouts, held_out, discover, config, parameters), progress)
+    run(bags, cell, out, settings(method, seed, rollouts, held_out, episodes, discover, config, parameters), progress)
 
 
 def settings(
@@ -64,6 +65,7 @@ def settings(
     seed: int,
     rollouts: int,
     held_out: float,
+    episodes: int,
     discover: bool,
     config: Path | None,
     parameters: Parameters = Parameters.cell,
@@ -77,6 +79,7 @@ def settings(
         "seed": seed,
         "rollouts": rollouts,
         "held_out_share": held_out,
+        "episodes": episodes,
         "discover": discover,
     }
     return given | (dict(read_yaml(config)) if config else {})

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import reprlib
 from collections.abc import Sequence
 from dataclasses import field
 from pathlib import Path, PurePosixPath
@@ -19,7 +18,7 @@ from compass_ros.config import read_yaml
 from compass_ros.episodes.episode_writer import write_episode
 from compass_ros.episodes.names import episode_name
 from compass_ros.episodes.table_files import FORMATS, Table
-from compass_ros.errors import BagError, ConfigError, DataError, nearest
+from compass_ros.errors import BagError, ConfigError, DataError, nearest, shown
 from compass_ros.types import QUANTITY_SIZE, Episode, Floats, Ints, Quantity, Track
 
 DATA_VARIABLE = "COMPASS_REAL_DATA"
@@ -117,7 +116,7 @@ def _config(path: Path) -> ImportConfig:
         where = ".".join(str(part) for part in first["loc"])
         hint = nearest(str(first["loc"][-1]), ImportConfig.__dataclass_fields__)
         hint = hint if first["type"] == "unexpected_keyword_argument" else ""
-        raise ConfigError(f"{path}: {where}: {first['msg']}, found {reprlib.repr(first['input'])}{hint}") from error
+        raise ConfigError(f"{path}: {where}: {first['msg']}, found {shown(first['input'])}{hint}") from error
 
 
 def _roots(path: Path) -> list[Path]:
