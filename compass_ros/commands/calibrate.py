@@ -96,7 +96,8 @@ def run(
     """Calibrate, write everything into `out`, print the tables."""
     from compass_ros.cells import load
     from compass_ros.config import calibration_config
-    from compass_ros.episodes import Source, read_episodes
+    from compass_ros.episodes import read_episodes
+    from compass_ros.operation.current import sources
     from compass_ros.operation.doubts import doubts
     from compass_ros.pipeline import calibrate as pipeline
     from compass_ros.reporting import print_result
@@ -105,8 +106,7 @@ def run(
     started = time.monotonic()
     validated = calibration_config(config, "command line")
     cell = load(cell_name, validated.parameters)
-    sources = [Source(o.topic or f"/puck_tracker/{o.name}/pose", o.name, o.quantity) for o in cell.objects]
-    episodes = read_episodes(bags, sources, cell.name, cell.hash)
+    episodes = read_episodes(bags, sources(cell), cell.name, cell.hash)
     make_writable(out)  # now, and not after minutes of work
     with _shown(style) as report:
         result, found = pipeline(episodes, cell, validated, report)
