@@ -80,7 +80,7 @@ class CellSpec:
 
     name: str
     dynamics: str
-    model: str
+    model: str = Field(max_length=200)
     control_dt_s: float = Field(gt=0)
     horizon: int = Field(ge=1)
     objects: tuple[ObjectSpec, ...]

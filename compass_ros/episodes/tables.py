@@ -65,7 +65,7 @@ class TrackColumns(Numbers):
 class Recordings:
     """Some tables of one file, or of several alike; each becomes a bag."""
 
-    file: str
+    file: Annotated[str, Field(max_length=200)]
     """In the data folder; a pattern, as `throw_*.csv`, stands for all files that match."""
     format: Literal["csv", "xlsx", "npz", "mat"]
     name: str

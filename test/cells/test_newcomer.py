@@ -60,6 +60,14 @@ def throws(folder: Path, count: int) -> None:
         np.savetxt(folder / f"throw_{number}.csv", rows, delimiter=",", header="time,x,y,z", comments="")
 
 
+def test_a_scene_with_an_endless_name_is_refused_with_one_line(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "lab.yaml").write_text(CELL.replace("lab.xml", "x" * 5000))
+    status, _, error = run("calibrate", "--cell", tmp_path / "lab.yaml", "--out", tmp_path / "out", tmp_path)
+    assert status == 1
+    assert "model: String should have at most 200 characters" in error
+    assert len(error) < 600
+
+
 @pytest.mark.slow
 def test_a_free_body_from_tables(run: Run, tmp_path: Path) -> None:
     throws(tmp_path, 6)
