@@ -5,6 +5,7 @@
 #   make prove   120 sealed worlds: conceal, calibrate blindly, unseal, count; goes on where it was stopped
 #   make real    cubes, balls and pendulums that others recorded (docs/real-data.md); the data lie in COMPASS_REAL_DATA
 #   make soak    half an hour of full load: memory, lost messages, latency; ARGS="--minutes 5" for less
+#   make fuzz    100,000 damaged bags and 100,000 damaged YAML files; a nightly job. make test tries some hundreds
 #   make lint | bench | bags | lock | clean
 #
 # ARGS are handed on:  make demo ARGS="--shots 20"
@@ -21,7 +22,7 @@ export MUJOCO_GL ?= disable
 SHARED := $(shell find resource config launch -type f -o -type l)
 NATIVE := $(wildcard compass_ros/simulation/native/*.c)
 
-.PHONY: demo prove real test lint bench bags install interfaces lock clean soak
+.PHONY: demo prove real test lint bench bags install interfaces lock clean soak fuzz
 .DELETE_ON_ERROR:
 
 demo: install
@@ -33,6 +34,10 @@ test: lint
 
 soak: install
 	$(BIN)/python scripts/soak.py $(ARGS)
+
+fuzz: install
+	$(BIN)/python -m test.faults.fuzz_bags $(ARGS)
+	$(BIN)/python -m test.faults.fuzz_yaml $(ARGS)
 
 lint: install
 	$(BIN)/ruff check .

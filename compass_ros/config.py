@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -12,13 +11,12 @@ import yaml
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from compass_ros.errors import ConfigError, nearest
+from compass_ros.errors import ConfigError, nearest, shown
+from compass_ros.plain_yaml import LARGEST, plain_yaml
 
 Parameters = Literal["cell", "auto"]
 """What is tuned: the parameters that the cell lists, or every other tunable field of its scene too."""
 _strict = ConfigDict(extra="forbid")
-_short = reprlib.Repr()
-_short.maxlevel = 2  # the default of 6 levels of 6 entries is a screen full
 
 
 @dataclass(frozen=True, config=_strict)
@@ -81,18 +79,22 @@ class CalibrationConfig:
     )
     discover: bool = Field(default=True, description="look for missing physics after the calibration")
     held_out_share: float = Field(default=0.25, ge=0, lt=1, description="share of the episodes that is never fitted")
+    episodes: int = Field(
+        default=100, ge=1, description="most episodes that are used; of more, so many are taken evenly over their order"
+    )
     threads: int = Field(default=0, ge=0, description="threads for rollouts; 0: all cores. Results do not depend on it")
     compass: CompassConfig = Field(default_factory=CompassConfig)
 
 
 def read_yaml(path: Path) -> Mapping[str, object]:
-    """The mapping in a YAML file, read with the safe loader. Raises ConfigError with one line."""
+    """The mapping in a YAML file, as plain data. Raises ConfigError with one line."""
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        with path.open(encoding="utf-8") as file:
+            content = plain_yaml(file.read(LARGEST + 1))
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from error
+        raise ConfigError(f"{path}: not valid YAML: {' '.join(str(error).split())[:300]}") from error
     if not isinstance(content, dict):
         raise ConfigError(f"{path}: expected a mapping at the top, found {type(content).__name__}")
     return content
@@ -107,4 +109,4 @@ def calibration_config(content: Mapping[str, object], where: str = "configuratio
         name = ".".join(str(part) for part in first["loc"])
         known = [f.name for f in (*fields(CalibrationConfig), *fields(CompassConfig))]
         hint = nearest(name.rsplit(".", 1)[-1], known) if first["type"] == "unexpected_keyword_argument" else ""
-        raise ConfigError(f"{where}: {name}: {first['msg']}, found {_short.repr(first['input'])}{hint}") from error
+        raise ConfigError(f"{where}: {name}: {first['msg']}, found {shown(first['input'])}{hint}") from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import platform
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
 
@@ -46,7 +47,8 @@ def calibrate(
 
     The same episodes, cell and configuration give the same result, bit for bit. Wall time is for the caller to add.
     """
-    fit, held_out = split(episodes, config)
+    used = evenly(episodes, config.episodes)
+    fit, held_out = split(used, config)
     simulator = Simulator(cell, threads=config.threads)
     data, judge = recordings(cell, fit), recordings(cell, held_out or fit)
     noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
@@ -57,7 +59,22 @@ def calibrate(
     if config.discover:
         refined = refined or refine(problem.likelihood, estimate.values)
         found = discover(simulator, refined, pose(simulator, judge, noise).likelihood, noise, config.seed, report)
-    return assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, found), found
+    result = assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, found)
+    if len(used) < len(episodes):
+        said = f"{len(used)} of {len(episodes)} episodes were used, evenly over the order of recording"
+        result = replace(result, warnings=(f"{said}; the option `episodes` takes more", *result.warnings))
+    return result, found
+
+
+def evenly(episodes: Sequence[Episode], most: int) -> list[Episode]:
+    """All episodes where they are not more than `most`; else so many of them, evenly over the order of recording.
+
+    A calibration's time and memory grow with its episodes, its error bars shrink with their square root.
+    """
+    ordered = sorted(episodes, key=lambda e: (e.start_ns, e.name, e.source))
+    if len(ordered) <= most:
+        return ordered
+    return [ordered[i] for i in np.round(np.linspace(0, len(ordered) - 1, most)).astype(int)]
 
 
 def split(episodes: Sequence[Episode], config: CalibrationConfig) -> tuple[list[Episode], list[Episode]]:

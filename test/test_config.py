@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import asdict
 from pathlib import Path
 
@@ -9,11 +10,32 @@ import pytest
 
 from compass_ros.config import CalibrationConfig, calibration_config, read_yaml
 from compass_ros.errors import ConfigError
+from compass_ros.plain_yaml import LARGEST
 
-BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
-    f"{name}: &{name} [{', '.join(9 * [f'*{before}'])}]\n" for before, name in zip("abcdefgh", "bcdefghi", strict=True)
-)
-"""A YAML of 400 characters whose last entry, written out, has 9^9 words."""
+
+def bomb() -> object:
+    """A list that, written out, has 9^9 words, and takes no room as it is."""
+    found: object = "x"
+    for _ in range(9):
+        found = [found] * 9
+    return found
+
+
+HOSTILE = {
+    "aliases": "a: &a [x]\nseed: [*a, *a]",
+    "merged aliases": "a: &a {k: 1}\nseed: {<<: *a}",
+    "brackets": "seed: " + "[" * 100_000,
+    "braces": "seed: " + "{a: " * 10_000,
+    "nested lists": "- " * 20_000 + "x",
+    "number of 5000 digits": "seed: " + "1" * 5000,
+    "hexadecimal number": "seed: 0x" + "f" * 100_000,
+    "number that is none": "seed: !!int foo",
+    "truth that is none": "seed: !!bool foo",
+    "date": "seed: !!timestamp foo",
+    "binary": "seed: !!binary QUFB",
+    "Python": "seed: !!python/object/apply:os.system ['touch owned']",
+    "too long": "seed: 1 # " + "x" * LARGEST,
+}
 
 
 def test_the_whole_configuration_can_be_written_down_and_read_again() -> None:
@@ -46,10 +68,34 @@ def test_what_is_wrong_is_named(content: dict[str, object], words: list[str]) ->
     assert all(word in said for word in words), said
 
 
-def test_a_value_that_would_fill_the_screen_is_shown_short(tmp_path: Path) -> None:
-    (tmp_path / "bomb.yaml").write_text(BOMB)
-    bomb = read_yaml(tmp_path / "bomb.yaml")["i"]
-    with pytest.raises(ConfigError, match="seed") as caught:
-        calibration_config({"seed": bomb})
-    assert len(str(caught.value)) < 400
+@pytest.mark.parametrize(
+    "value",
+    [bomb(), "x" * 10**6, ["y" * 10**6] * 3, {"z" * 10**6: "z" * 10**6}, 2**100_000, list(range(10**5)), b"b" * 10**6],
+    ids=["bomb", "text", "texts", "mapping", "number", "list", "bytes"],
+)
+def test_a_value_that_would_fill_the_screen_is_shown_short(value: object) -> None:
+    for content in ({"discover": value}, {"compass": {"hidden_dim": {"a": value}}}):
+        with pytest.raises(ConfigError, match=r"discover|hidden_dim") as caught:
+            calibration_config(content)
+        assert len(str(caught.value)) < 350
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_a_hostile_yaml_is_refused_at_once_with_one_line(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "hostile.yaml"
+    path.write_text(HOSTILE[kind])
+    before = time.process_time()
+    with pytest.raises(ConfigError, match=r"hostile\.yaml: not valid YAML: ") as caught:
+        read_yaml(path)
+    assert time.process_time() - before < 2
+    assert len(str(caught.value)) < 400 + len(str(path))
     assert "\n" not in str(caught.value)
+
+
+def test_what_a_plain_yaml_may_say(tmp_path: Path) -> None:
+    path = tmp_path / "plain.yaml"
+    path.write_text("a: [1, -2.5e+3, .inf, true, null, ~, 0x1f, text]\nb: {day: 2026-11-20, quoted: '1'}\n")
+    content = read_yaml(path)
+    assert content["a"] == [1, -2500.0, float("inf"), True, None, None, 31, "text"]
+    assert content["b"] == {"day": "2026-11-20", "quoted": "1"}

@@ -29,7 +29,7 @@ JOINS = {
     "nodes": 6,
     "program": 7,
 }
-LAYERS = {"types": 0, "errors": 0, "config": 1, **dict.fromkeys(STEPS, 2), **JOINS}
+LAYERS = {"types": 0, "errors": 0, "plain_yaml": 0, "config": 1, **dict.fromkeys(STEPS, 2), **JOINS}
 """A module imports from lower layers, or from its own part."""
 
 HOMES = {

@@ -11,7 +11,7 @@ from compass_ros.calibration.noise import Noise, measure_noise
 from compass_ros.cells import load
 from compass_ros.config import CalibrationConfig
 from compass_ros.errors import DataError
-from compass_ros.pipeline import calibrate, launched, noise_floor, split
+from compass_ros.pipeline import calibrate, evenly, launched, noise_floor, split
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import Replay, recordings
 from compass_ros.types import Episode, Progress, Result, Track
@@ -75,6 +75,24 @@ def test_an_episode_more_leaves_most_of_the_held_out_ones_where_they_are() -> No
     before = {e.name for e in split(twelve, CONFIG)[1]}
     after = {e.name for e in split(twelve + named("another"), CONFIG)[1]}
     assert len(before - after) <= 1
+
+
+def test_of_too_many_episodes_an_even_choice_is_used() -> None:
+    """In the order of recording, whatever the order of names or of the list."""
+    many = named(*(f"shot{i % 7}_{i}" for i in range(1000)))
+    chosen = evenly(many[::-1], 100)
+    at = np.array([e.start_ns - START for e in chosen])
+    assert (at[0], at[-1], len(at)) == (0, 999, 100)
+    assert set(np.diff(at)) == {10, 11}
+    assert evenly(many[:100], 100) == many[:100]
+    assert evenly(many, 1) == many[:1]
+
+
+def test_an_even_choice_is_said(episodes: list[Episode], result: Result) -> None:
+    few, _ = calibrate(episodes, cell(), replace(CONFIG, episodes=4))
+    assert len(few.fit) + len(few.held_out) == 4
+    assert few.warnings[0].startswith("4 of 6 episodes were used")
+    assert not any("were used" in said for said in result.warnings)
 
 
 @pytest.mark.parametrize(("share", "count"), [(0.0, 0), (0.25, 2), (0.5, 4)])

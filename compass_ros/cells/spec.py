@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as validated
 
 from compass_ros.cells.start import ReleaseSpec, StartSpec
-from compass_ros.errors import ConfigError, nearest
+from compass_ros.errors import ConfigError, nearest, shown
 from compass_ros.types import Quantity
 
 _strict = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -22,10 +22,10 @@ _UNKNOWN = "unexpected_keyword_argument"
 class ObjectSpec:
     """A tracked object."""
 
-    name: str
+    name: str = Field(max_length=200)
     quantity: Quantity
-    topic: str = ""
-    body: str = ""
+    topic: str = Field("", max_length=200)
+    body: str = Field("", max_length=200)
     """Body (quantity `joint`: joint) of the scene; the object's own name where empty."""
 
 
@@ -33,24 +33,24 @@ class ObjectSpec:
 class FactorSpec:
     """One of the K parts of the state whose trajectory difference is measured."""
 
-    name: str
-    object: str
+    name: str = Field(max_length=200)
+    object: str = Field(max_length=200)
     part: Literal["all", "position", "orientation", "roll", "pitch", "yaw"] = "all"
     """Which numbers of the object's row."""
 
 
 @validated(frozen=True, config=_strict, kw_only=True)
 class ActionSpec:
-    name: str
-    unit: str
+    name: str = Field(max_length=200)
+    unit: str = Field(max_length=200)
     low: float
     high: float
     reach: tuple[float, float] | None = None
     """What the robot could do, where that is more than the action space; `compass plan` looks there."""
     description: str = ""
-    field: str = ""
+    field: str = Field("", max_length=200)
     """Cells without code: what it sets, `qpos[0]` or `qvel[0]` of a joint at the start, or `ctrl` of an actuator."""
-    of: str = ""
+    of: str = Field("", max_length=200)
     """Name of that joint or actuator."""
     from_s: float = Field(0.0, ge=0)
     """When a `ctrl` begins."""
@@ -60,17 +60,17 @@ class ActionSpec:
 
 @validated(frozen=True, config=_strict, kw_only=True)
 class ParameterSpec:
-    name: str
+    name: str = Field(max_length=200)
     default: float
     bounds: tuple[float, float]
-    unit: str
+    unit: str = Field(max_length=200)
     half_width: float = Field(gt=0)
     target: float | None = None
     """Value in the "real" simulator of the paper's sim-to-sim experiment."""
     description: str = ""
-    field: str = ""
+    field: str = Field("", max_length=200)
     """Where the cell has no code of its own: field of mjModel, with its index as in `geom_friction[0]`."""
-    of: str = ""
+    of: str = Field("", max_length=200)
     """Name of the element whose field it is."""
 
 
@@ -78,9 +78,9 @@ class ParameterSpec:
 class CellSpec:
     """The YAML, field by field."""
 
-    name: str
-    dynamics: str
-    model: str
+    name: str = Field(max_length=200)
+    dynamics: str = Field(max_length=200)
+    model: str = Field(max_length=200)
     control_dt_s: float = Field(gt=0)
     horizon: int = Field(ge=1)
     objects: tuple[ObjectSpec, ...]
@@ -110,7 +110,7 @@ def validated_spec(content: Mapping[str, object], where: str) -> CellSpec:
         specs = (CellSpec, ParameterSpec, ActionSpec, ObjectSpec, FactorSpec, StartSpec, ReleaseSpec)
         known = [f.name for spec in specs for f in fields(spec)]
         hint = nearest(name.rsplit(".", 1)[-1], known) if first["type"] == _UNKNOWN else ""
-        raise ConfigError(f"{where}: {name}: {first['msg']}, found {str(first['input'])[:80]!r}{hint}") from error
+        raise ConfigError(f"{where}: {name}: {first['msg']}, found {shown(first['input'])}{hint}") from error
     _check_values(spec, where)
     _check_names(spec, where)
     return spec

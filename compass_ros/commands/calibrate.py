@@ -51,12 +51,13 @@ def calibrate(
     seed: Annotated[int, typer.Option(min=0, help="decides which episodes are held out, and all random numbers")] = 0,
     rollouts: Annotated[int, typer.Option(min=0, help="most simulated rollouts; 0: the method's own budget")] = 0,
     held_out: Annotated[float, typer.Option(min=0, max=0.9, help="share of the episodes that is never fitted")] = 0.25,
+    episodes: Annotated[int, typer.Option(min=1, help="most episodes to use; of more, an even choice")] = 100,
     config: Annotated[Path | None, typer.Option(help="YAML with any field of the configuration")] = None,
     discover: Annotated[bool, typer.Option(help="look for missing physics after the calibration")] = True,
     progress: Annotated[ProgressStyle, typer.Option(help="how to show progress")] = ProgressStyle.bar,
 ) -> None:
     """Find which simulator parameters are wrong, what they should be, and what physics is missing."""
-    run(bags, cell, out, settings(method, seed, rollouts, held_out, discover, config, parameters), progress)
+    run(bags, cell, out, settings(method, seed, rollouts, held_out, episodes, discover, config, parameters), progress)
 
 
 def settings(
@@ -64,6 +65,7 @@ def settings(
     seed: int,
     rollouts: int,
     held_out: float,
+    episodes: int,
     discover: bool,
     config: Path | None,
     parameters: Parameters = Parameters.cell,
@@ -77,6 +79,7 @@ def settings(
         "seed": seed,
         "rollouts": rollouts,
         "held_out_share": held_out,
+        "episodes": episodes,
         "discover": discover,
     }
     return given | (dict(read_yaml(config)) if config else {})
@@ -93,7 +96,8 @@ def run(
     """Calibrate, write everything into `out`, print the tables."""
     from compass_ros.cells import load
     from compass_ros.config import calibration_config
-    from compass_ros.episodes import Source, read_episodes
+    from compass_ros.episodes import read_episodes
+    from compass_ros.operation.current import sources
     from compass_ros.operation.doubts import doubts
     from compass_ros.pipeline import calibrate as pipeline
     from compass_ros.reporting import print_result
@@ -102,8 +106,7 @@ def run(
     started = time.monotonic()
     validated = calibration_config(config, "command line")
     cell = load(cell_name, validated.parameters)
-    sources = [Source(o.topic or f"/puck_tracker/{o.name}/pose", o.name, o.quantity) for o in cell.objects]
-    episodes = read_episodes(bags, sources, cell.name, cell.hash)
+    episodes = read_episodes(bags, sources(cell), cell.name, cell.hash)
     make_writable(out)  # now, and not after minutes of work
     with _shown(style) as report:
         result, found = pipeline(episodes, cell, validated, report)

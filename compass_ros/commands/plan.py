@@ -97,12 +97,12 @@ def read_shots(path: Path, cell: Cell) -> Floats:
     import numpy as np
 
     from compass_ros.config import read_yaml
-    from compass_ros.errors import ConfigError, nearest
+    from compass_ros.errors import ConfigError, nearest, shown
 
     content = read_yaml(path)
     listed = content.get("shots")
     if not isinstance(listed, list) or not listed:
-        raise ConfigError(f"{path}: expected a list `shots`, found {sorted(map(str, content))}")
+        raise ConfigError(f"{path}: expected a list `shots`, found {shown(sorted(map(str, content)))}")
     names = [a.name for a in cell.action]
     rows = []
     for number, shot in enumerate(listed, 1):
@@ -111,10 +111,12 @@ def read_shots(path: Path, cell: Cell) -> Floats:
             found = sorted(map(str, shot)) if isinstance(shot, dict) else shot
             strange = [k for k in found if k not in names] if isinstance(shot, dict) else []
             hint = nearest(strange[0], names) if strange else ""
-            raise ConfigError(f"{where}: expected {', '.join(names)}, found {found}{hint}")
+            raise ConfigError(f"{where}: expected {', '.join(names)}, found {shown(found)}{hint}")
         for name, (low, high) in zip(names, cell.reach.tolist(), strict=True):
             value = shot[name]
             if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-                raise ConfigError(f"{where}: {name} = {value!r}: expected a number in the reach [{low:g}, {high:g}]")
+                raise ConfigError(
+                    f"{where}: {name} = {shown(value)}: expected a number in the reach [{low:g}, {high:g}]"
+                )
         rows.append([float(shot[name]) for name in names])
     return np.array(rows)

@@ -95,8 +95,8 @@ def discover(
 ) -> Discovery:
     """Look for what the calibrated simulator lacks. `judge`: held-out episodes, same prior and noise."""
     likelihood = refined.likelihood
-    if len(likelihood.inputs) < MIN_EPISODES:
-        return not_evaluated(f"{len(likelihood.inputs)} fitted episodes are too few, {MIN_EPISODES} are the least")
+    if lacking := _lacking(simulator, len(likelihood.inputs)):
+        return not_evaluated(lacking)
     try:
         warnings = objections(
             simulator.cell, likelihood.inputs, 1 / float(np.median(np.diff(likelihood.time_s, axis=1)))
@@ -134,6 +134,15 @@ def discover(
         choice = choose(space, scores, asked, unseen)
     tell("weigh effects", 0.9)
     return found.judged(choice, unseen)
+
+
+def _lacking(simulator: Simulator, episodes: int) -> str:
+    """Why nothing can be looked for; empty where it can."""
+    if episodes < MIN_EPISODES:
+        return f"{episodes} fitted episodes are too few, {MIN_EPISODES} are the least"
+    if not simulator.movers():
+        return "effects act on bodies that slide in the plane and on joints; none is tracked in this cell"
+    return ""
 
 
 def _screen(simulator: Simulator, refined: Refined, asked: Sequence[Candidate]) -> tuple[Space, list[Score]]:

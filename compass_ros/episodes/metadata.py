@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import yaml
 
 from compass_ros.errors import BagError
+from compass_ros.plain_yaml import LARGEST, plain_yaml
 
 FILE_NAME = "metadata.yaml"
-_LARGEST = 16 * 2**20
+_LARGEST = LARGEST
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def read_summary(folder: Path) -> BagSummary:
     try:
         if path.stat().st_size > _LARGEST:
             raise BagError(f"{path}: larger than {_LARGEST} bytes; expected a rosbag2 metadata.yaml")
-        content = _plain(path.read_text(encoding="utf-8"))
+        content = plain_yaml(path.read_text(encoding="utf-8"))
         information = content["rosbag2_bagfile_information"]
         return BagSummary(
             storage=_text(information["storage_identifier"]),
@@ -82,23 +82,10 @@ def read_summary(folder: Path) -> BagSummary:
 def qos_profiles(text: str) -> list[object]:
     """The profiles in a YAML text as bags hold it; none where the text is something else."""
     try:
-        found = _plain(text)
+        found = plain_yaml(text)
     except (yaml.YAMLError, ValueError, RecursionError):
         return []
     return found if isinstance(found, list) else []
-
-
-class _PlainLoader(yaml.SafeLoader):
-    """Takes no aliases: a few lines of them can stand for more than any memory holds."""
-
-    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        if self.check_event(yaml.AliasEvent):
-            raise yaml.YAMLError("aliases are not read")
-        return super().compose_node(parent, index)
-
-
-def _plain(text: str) -> Any:
-    return yaml.load(text, Loader=_PlainLoader)  # noqa: S506  (a SafeLoader with less)
 
 
 class _PlainDumper(yaml.SafeDumper):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import re
-import reprlib
 from collections.abc import Sequence
 from dataclasses import field
+from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 from string import Formatter
 from typing import Annotated, Literal
@@ -19,7 +19,7 @@ from compass_ros.config import read_yaml
 from compass_ros.episodes.episode_writer import write_episode
 from compass_ros.episodes.names import episode_name
 from compass_ros.episodes.table_files import FORMATS, Table
-from compass_ros.errors import BagError, ConfigError, DataError, nearest
+from compass_ros.errors import BagError, ConfigError, DataError, nearest, shown
 from compass_ros.types import QUANTITY_SIZE, Episode, Floats, Ints, Quantity, Track
 
 DATA_VARIABLE = "COMPASS_REAL_DATA"
@@ -63,9 +63,10 @@ class TrackColumns(Numbers):
 
 @dataclass(frozen=True, config=_strict)
 class Recordings:
-    """Some tables of one file; each becomes a bag."""
+    """Some tables of one file, or of several alike; each becomes a bag."""
 
-    file: str
+    file: Annotated[str, Field(max_length=200)]
+    """In the data folder; a pattern, as `throw_*.csv`, stands for all files that match."""
     format: Literal["csv", "xlsx", "npz", "mat"]
     name: str
     """Name of the episode, with {key}, {group}, {index}; other signs than letters, digits, `_`, `-`, `.` become `_`."""
@@ -117,7 +118,7 @@ def _config(path: Path) -> ImportConfig:
         where = ".".join(str(part) for part in first["loc"])
         hint = nearest(str(first["loc"][-1]), ImportConfig.__dataclass_fields__)
         hint = hint if first["type"] == "unexpected_keyword_argument" else ""
-        raise ConfigError(f"{path}: {where}: {first['msg']}, found {reprlib.repr(first['input'])}{hint}") from error
+        raise ConfigError(f"{path}: {where}: {first['msg']}, found {shown(first['input'])}{hint}") from error
 
 
 def _roots(path: Path) -> list[Path]:
@@ -125,23 +126,30 @@ def _roots(path: Path) -> list[Path]:
     return [Path(named)] if named else [path.parent, _PROJECT.parent / "shared" / "data"]
 
 
-def _find(name: str, roots: Sequence[Path], path: Path) -> Path:
+def _find(name: str, roots: Sequence[Path], path: Path) -> list[Path]:
+    """The files of the first folder that has any."""
     pure = PurePosixPath(name)
     if pure.is_absolute() or ".." in pure.parts:
         raise ConfigError(f"{path}: file '{name}': expected a path inside the data folder")
     for root in roots:
         if (root / pure).is_file():
-            return root / pure
+            return [root / pure]
+        folder = root / pure.parent
+        found = [f for f in folder.iterdir() if fnmatchcase(f.name, pure.name)] if folder.is_dir() else []
+        if found:
+            return sorted(found)
     raise DataError(f"{path}: no file {name} in {' or '.join(str(root) for root in roots)}; set {DATA_VARIABLE}")
 
 
-def _episodes(config: ImportConfig, recordings: Recordings, file: Path) -> list[Episode]:
-    found = [_episode(config, recordings, file, table) for table in _tables(recordings, file)]
+def _episodes(config: ImportConfig, recordings: Recordings, files: Sequence[Path]) -> list[Episode]:
+    found = [_episode(config, recordings, file, table) for file in files for table in _tables(recordings, file)]
     names = [episode.name for episode in found]
+    where = files[0] if len(files) == 1 else files[0].parent / recordings.file
     if not found:
-        raise DataError(f"{file}: no table matches '{recordings.tables}'")
-    if len(set(names)) < len(names):
-        raise ConfigError(f"{file}: '{recordings.name}' gives the same name to several recordings, e.g. {names[0]}")
+        raise DataError(f"{where}: no table matches '{recordings.tables}'")
+    twice = [name for i, name in enumerate(names) if name in names[:i]]
+    if twice:
+        raise ConfigError(f"{where}: '{recordings.name}' gives the same name to several recordings, e.g. {twice[0]}")
     return found
 
 

@@ -22,7 +22,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from compass_ros.cells import load
-from compass_ros.errors import CompassError, ConfigError
+from compass_ros.errors import CompassError, ConfigError, shown
 from compass_ros.nodes import convert
 from compass_ros.nodes.job import Job, Outcome, Request
 from compass_ros.nodes.journal import cut_off
@@ -66,10 +66,8 @@ class Calibrator(ManagedNode):
         declare("seed", 0, "seed of all random numbers", integer_range=natural)
         declare("rollouts", 0, "budget of simulated rollouts [count]; 0: the method's default", integer_range=natural)
         declare("method", "default", "as `compass calibrate --method`")
-        newest = (
-            "of the episodes that the recorder finishes, only so many of the newest are calibrated from; a thousand "
-        )
-        newest += "take an hour and say little more than a hundred"
+        newest = "of the episodes that the recorder finishes, only so many of the newest are read; of more than 100 "
+        newest += "a calibration uses an even choice of 100"
         declare("newest", 100, newest, integer_range=[IntegerRange(from_value=1, to_value=10_000, step=1)])
         declare("calibrate_at_start", True, "calibrate when the node becomes active, if `bags` names any")
         declare("resume", True, "calibrate anew when the node was killed in a calibration; false: only say so")
@@ -174,7 +172,7 @@ class Calibrator(ManagedNode):
         value = self.get_parameter("bags").value
         bags = [value] if isinstance(value, str) else list(value or ())
         if not all(isinstance(bag, str) for bag in bags):
-            raise ConfigError(f"bags: expected a path or a list of paths, found {value!r}")
+            raise ConfigError(f"bags: expected a path or a list of paths, found {shown(value)}")
         return tuple(bag for bag in bags if bag)
 
     def _request(self, goal: Calibrate.Goal) -> Request:

@@ -11,7 +11,7 @@ import numpy as np
 from compass_ros.cells import Cell
 from compass_ros.concealed.stage import Stage
 from compass_ros.config import read_yaml
-from compass_ros.errors import ConfigError, nearest
+from compass_ros.errors import ConfigError, nearest, shown
 from compass_ros.tracking.scene_config import SceneConfig
 from compass_ros.tracking.virtual_camera import exposure_times
 from compass_ros.types import Floats
@@ -61,7 +61,7 @@ def hidden_values(cell: Cell, file: str, seed: int) -> Floats:
             raise ConfigError(f"{file}: cell '{cell.name}' has no parameter '{name}'{nearest(str(name), values)}")
         low, high = bounds[name]
         if not isinstance(value, (int, float)) or not low <= value <= high:
-            raise ConfigError(f"{file}: {name}: expected a number from {low} to {high}, found {value!r}")
+            raise ConfigError(f"{file}: {name}: expected a number from {low} to {high}, found {shown(value)}")
         values[name] = float(value)
     return np.array(list(values.values()))
 
@@ -77,7 +77,8 @@ def action_of(cell: Cell, names: Sequence[str], values: Sequence[float]) -> Floa
     given = dict(zip(names, values, strict=False))
     expected = [field.name for field in cell.action]
     if len(names) != len(values) or sorted(names) != sorted(expected):
-        raise ConfigError(f"shot command: expected values of {expected}, found {len(values)} values of {list(names)}")
+        found = f"{len(values)} values of {shown(list(names))}"
+        raise ConfigError(f"shot command: expected values of {expected}, found {found}")
     action = np.array([given[name] for name in expected])
     for name, value, (low, high) in zip(expected, action, cell.reach, strict=True):
         if not low - 1e-9 <= value <= high + 1e-9:

@@ -28,7 +28,7 @@ from std_srvs.srv import Trigger
 
 from compass_ros.cells import load
 from compass_ros.config import read_yaml
-from compass_ros.errors import CompassError, ConfigError
+from compass_ros.errors import CompassError, ConfigError, shown
 from compass_ros.nodes.images import stamp_ns
 
 
@@ -121,10 +121,10 @@ def read_shots(path: Path) -> list[dict[str, float]]:
     """Shots of a YAML. Raises ConfigError with one line."""
     shots = read_yaml(path).get("shots")
     if not isinstance(shots, list) or not shots:
-        raise ConfigError(f"{path}: expected a list 'shots', found {shots!r}")
+        raise ConfigError(f"{path}: expected a list 'shots', found {shown(shots)}")
     for number, shot in enumerate(shots, 1):
         if not isinstance(shot, dict) or not all(isinstance(value, (int, float)) for value in shot.values()):
-            raise ConfigError(f"{path}: shot {number}: expected numbers by name, found {shot!r}")
+            raise ConfigError(f"{path}: shot {number}: expected numbers by name, found {shown(shot)}")
     return [{str(name): float(value) for name, value in shot.items()} for shot in shots]
 
 

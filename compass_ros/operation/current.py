@@ -10,7 +10,7 @@ import numpy as np
 
 from compass_ros.cells import Cell
 from compass_ros.cells.auto import with_auto
-from compass_ros.episodes import Source, find_bags, read_episode
+from compass_ros.episodes import Source, default_sources, find_bags, read_episode
 from compass_ros.reporting.result_json import read_result
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects.exported import read_effects
@@ -95,8 +95,11 @@ def _inside(cell: Cell, name: str, value: float) -> float:
 
 
 def sources(cell: Cell) -> list[Source]:
-    """Where the tracks of a cell's objects are in its bags."""
-    return [Source(o.topic or f"/puck_tracker/{o.name}/pose", o.name, o.quantity) for o in cell.objects]
+    """Where the tracks of a cell's objects are in its bags; by default where tracker and import put them."""
+    return [
+        Source(o.topic, o.name, o.quantity) if o.topic else default_sources([o.name], o.quantity)[0]
+        for o in cell.objects
+    ]
 
 
 def read(cell: Cell, bag: Path | str) -> Episode:

@@ -18,7 +18,7 @@ from pathlib import Path
 import yaml
 
 from compass_ros.config import read_yaml
-from compass_ros.errors import ConfigError
+from compass_ros.errors import ConfigError, shown
 from compass_ros.reporting.atomic import write_text
 from compass_ros.reporting.result_json import read_result
 
@@ -110,7 +110,7 @@ class Versions:
         found = read_yaml(path).get("applied")
         numbers = [n for n in found if isinstance(n, int)] if isinstance(found, list) else []
         if not numbers or numbers != found or numbers[0] != 0:
-            raise ConfigError(f"{path}: applied: expected version numbers from 0 on, found {found!r}")
+            raise ConfigError(f"{path}: applied: expected version numbers from 0 on, found {shown(found)}")
         missing = [n for n in numbers[1:] if not (self._version(n).folder / _RESULT).is_file()]
         if missing:
             raise ConfigError(f"{path}: names version {missing[0]}, which is not in {self.folder}")

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from compass_ros.config import read_yaml
-from compass_ros.errors import TrackingError
+from compass_ros.errors import TrackingError, shown
 from compass_ros.types import Floats
 
 _DISTORTION_SIZES = {"": (0,), "plumb_bob": (0, 4, 5), "rational_polynomial": (8,)}
@@ -136,11 +136,11 @@ def read_camera(path: Path) -> CameraModel:
     for name in ("camera_matrix", "distortion_coefficients"):
         entry = content.get(name)
         if not isinstance(entry, Mapping) or not isinstance(entry.get("data"), list):
-            raise TrackingError(f"{path}: expected '{name}: {{data: [...]}}', found {entry!r}")
+            raise TrackingError(f"{path}: expected '{name}: {{data: [...]}}', found {shown(entry)}")
         data[name] = entry["data"]
     size = [content.get("image_width"), content.get("image_height")]
     if not all(isinstance(number, int) for number in size):
-        raise TrackingError(f"{path}: expected integers image_width and image_height, found {size}")
+        raise TrackingError(f"{path}: expected integers image_width and image_height, found {shown(size)}")
     model = str(content.get("distortion_model", "plumb_bob"))
     width, height = (int(str(number)) for number in size)
     return camera_model((width, height), data["camera_matrix"], model, data["distortion_coefficients"], str(path))

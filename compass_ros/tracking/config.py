@@ -14,7 +14,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from compass_ros.config import read_yaml
-from compass_ros.errors import ConfigError, nearest
+from compass_ros.errors import ConfigError, nearest, shown
 
 _strict = ConfigDict(extra="forbid")
 _OF_THE_NODE = frozenset({"object_names", "autostart", "camera_timeout_s", "moved_m", "lost_s"})
@@ -91,10 +91,10 @@ def tracker_config(content: Mapping[str, object], where: str = "tracker configur
         name = ".".join(str(part) for part in first["loc"])
         known = [f.name for kind in (TrackerConfig, FiducialConfig, ObjectConfig) for f in fields(kind)]
         hint = nearest(name.rsplit(".", 1)[-1], known) if first["type"] == "unexpected_keyword_argument" else ""
-        raise ConfigError(f"{where}: {name}: {first['msg']}, found {first['input']!r}{hint}") from error
+        raise ConfigError(f"{where}: {name}: {first['msg']}, found {shown(first['input'])}{hint}") from error
     markers = config.fiducials
     if not len(markers.ids) == len(markers.x_m) == len(markers.y_m) or len(set(markers.ids)) != len(markers.ids):
-        raise ConfigError(f"{where}: fiducials: expected distinct ids and as many x_m and y_m, found {markers}")
+        raise ConfigError(f"{where}: fiducials: expected distinct ids and as many x_m and y_m, found {shown(markers)}")
     if not config.objects:
         raise ConfigError(f"{where}: objects: expected at least one object, found none")
     return config

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from compass_ros.errors import ConfigError
+from compass_ros.errors import ConfigError, shown
 from compass_ros.tracking.camera import CameraModel, TableView
 from compass_ros.tracking.config import FiducialConfig
 
@@ -102,7 +102,7 @@ def scene_config(content: Mapping[str, object], where: str = "virtual camera") -
     except ValidationError as error:
         first = error.errors()[0]
         name = ".".join(str(part) for part in first["loc"])
-        raise ConfigError(f"{where}: {name}: {first['msg']}, found {first['input']!r}") from error
+        raise ConfigError(f"{where}: {name}: {first['msg']}, found {shown(first['input'])}") from error
 
 
 def camera_of(config: CameraConfig) -> CameraModel:

@@ -49,6 +49,17 @@ def drops(tmp_path: Path) -> Path:
     return tmp_path
 
 
+def test_many_files_by_a_pattern(drops: Path) -> None:
+    for name in ("fall_2", "fall_1", "other"):
+        (drops / f"{name}.csv").write_text("t,h\n0,100\n20,90\n40,70\n")
+    recordings = [{"file": "fall_*.csv", "format": "csv", "name": "{key}"}]
+    bags = import_tables(spec(drops, recordings=recordings), drops / "out")
+    assert [bag.name for bag in bags] == ["fall_1", "fall_2"]
+    recordings[0]["name"] = "same"
+    with pytest.raises(ConfigError, match=r"fall_\*\.csv: 'same' gives the same name to several"):
+        import_tables(spec(drops, recordings=recordings), drops / "again")
+
+
 def test_csv(drops: Path) -> None:
     bags = import_tables(spec(drops), drops / "out")
     assert [bag.name for bag in bags] == ["drop_1", "drop_2"]

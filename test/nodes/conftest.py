@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import pytest
 from domain_coordinator import domain_id
 
+from test.nodes.episodes import TOPIC
 from test.nodes.harness import NodeProcess, Probe, remove_shared_memory
 
 ROOT = Path(__file__).parents[2]
@@ -52,3 +53,9 @@ def probe(domain: int) -> Iterator[Probe]:
     client = Probe(domain)
     yield client
     client.close()
+
+
+@pytest.fixture
+def recorder(start_node: StartNode, tmp_path: Path) -> NodeProcess:
+    """A recorder of one puck's poses and of the shots."""
+    return start_node("recorder", directory=str(tmp_path / "bags"), topics=[TOPIC, "/virtual_cell/shot"], min_free_mb=1)

@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass as validated
 
 from compass_ros.cells.dynamics import Sliding
 from compass_ros.config import read_yaml
-from compass_ros.errors import ConfigError
+from compass_ros.errors import ConfigError, shown
 from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.registry import effect
 
@@ -96,7 +96,7 @@ def read_effects(path: Path | str) -> Exported:
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"])
-        raise ConfigError(f"{path}: {field}: {first['msg']}, found {str(first['input'])[:80]!r}") from error
+        raise ConfigError(f"{path}: {field}: {first['msg']}, found {shown(first['input'])}") from error
     sliding = {
         name: Sliding(name, np.array([c.friction]), np.array([c.creep]), np.array([c.load]))
         for name, c in file.sliding.items()
@@ -109,7 +109,7 @@ def _fitted(entry: _Entry, path: Path | str) -> FittedEffect:
     expected = {q.name: q.unit for q in kind.quantities}
     found = {name: value.unit for name, value in entry.values.items()}
     if found != expected:
-        raise ConfigError(f"{path}: {entry.name}: expected values with units {expected}, found {found}")
+        raise ConfigError(f"{path}: {entry.name}: expected values with units {expected}, found {shown(found)}")
     given = [entry.values[q.name] for q in kind.quantities]
     std = tuple(float("nan") if v.std is None else v.std for v in given)
     return FittedEffect(Attached(kind, entry.objects), tuple(v.value for v in given), std)

@@ -22,7 +22,7 @@ FLAGS = (
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage",
     "--remote-debugging-pipe", "--hide-scrollbars",
 )  # fmt: skip
-TIMEOUT_S = 30.0
+TIMEOUT_S = 180.0  # a busy machine draws slowly
 CONSOLE = ("Runtime.consoleAPICalled", "Runtime.exceptionThrown", "Log.entryAdded")
 
 
