@@ -351,15 +351,20 @@ class Finding:
         return self.refined.likelihood
 
     def _tried(self, choice: Choice, chosen: Joint | None) -> tuple[Tried, ...]:
-        kept = {a.effect.name for a in chosen.added} if chosen else set()
+        movers = self.simulator.movers()
+
+        def on(joint: Joint) -> str:
+            parts = {o for a in joint.added for o in a.objects}
+            return "" if not parts or parts >= set(movers) else f"on {' and '.join(sorted(parts))}: "
+
         return tuple(
             Tried(
                 joint.name,
                 joint.added[0].effect.channel,
                 self._evidence(joint, choice).log_evidence,
                 self._gain(joint),
-                joint.name in kept,
-                f"explains {100 * choice.share(joint):.0f} % of the excess",
+                joint is chosen,
+                f"{on(joint)}explains {100 * choice.share(joint):.0f} % of the excess",
             )
-            for joint in choice.singles
+            for joint in ((choice.pair,) if choice.pair else ()) + choice.singles
         )
