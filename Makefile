@@ -6,7 +6,8 @@
 #   make real    cubes, balls and pendulums that others recorded (docs/real-data.md); the data lie in COMPASS_REAL_DATA
 #   make soak    half an hour of full load: memory, lost messages, latency; ARGS="--minutes 5" for less
 #   make fuzz    100,000 damaged bags and 100,000 damaged YAML files; a nightly job. make test tries some hundreds
-#   make lint | bench | bags | lock | clean
+#   make bench   the benchmark of methods (docs/benchmarks.md); goes on where it was stopped
+#   make lint | bags | lock | clean
 #
 # ARGS are handed on:  make demo ARGS="--shots 20"
 
@@ -44,7 +45,7 @@ lint: install
 	$(BIN)/mypy
 
 bench: install
-	$(BIN)/compass bench $(ARGS)
+	$(BIN)/compass bench --out benchmarks/results $(ARGS)
 
 # After a change to the air-hockey cell: the shipped bags, recorded anew by the nodes.
 bags: install

@@ -13,6 +13,8 @@ _MIN_STILL = 5
 """Frames before the command that an episode needs to count as still."""
 _WORSE = 1.25
 """Flight noise over noise at rest from which motion counts as a source of noise (blur, stamps)."""
+_FINEST = 1e-5
+"""Least sigma [m]: a hundredth of a millimetre is what the simulator itself is smooth to (docs/simulation.md)."""
 _WINDOW = 7
 """Frames of the local parabola that takes the motion out of a flight."""
 _OWN = 0.5
@@ -63,8 +65,8 @@ def _measured_noise(time_s: Floats, measured: Floats, expected: float) -> Noise:
     both = np.sqrt((of_rest * at_rest**2 + of_flight * np.nan_to_num(flight) ** 2) / (of_rest + of_flight))
     moving_is_worse = np.nan_to_num(flight) > _WORSE * at_rest
     sigma = np.where(moving_is_worse, flight, both)
-    sigma = _pooled(np.maximum(sigma, 1e-6), np.where(moving_is_worse, of_flight, of_rest + of_flight))
-    return Noise(sigma, correlation)
+    freedom = np.where(moving_is_worse, np.maximum(of_flight, 1.0), of_rest + of_flight)
+    return Noise(_pooled(np.maximum(sigma, _FINEST), freedom), correlation)
 
 
 def _at_rest(still: Floats) -> tuple[Floats, float]:
