@@ -33,6 +33,8 @@ OF_LIMIT = 8.0
 """Log evidence by which an effect must surpass what it comes to at an end of its shapes."""
 LEADS = 0.6
 """Share from which the best effect is surely one of two; below, the second best may be instead."""
+LEADERS = 4
+"""Best fits that are continued, and of which one may be named."""
 TRIED = 6
 """Names that are fitted at once, the most promising first; as many again where none of them is enough."""
 PROMISING = 0.1
@@ -145,18 +147,21 @@ def choose(space: Space, scores: Sequence[Score], candidates: Sequence[Candidate
     base = float(cost(space.likelihood, [space.fit.point], space.fit.robust)[0][0])
     floor = floor_of(space.likelihood, space.fit, base)
     singles: list[Joint] = []
+    ended: list[Joint] = []
     for promising in _rounds(scores):
         tried = [fit_jointly(space, [s], 4, tolerance=2.0) for s in promising]
         best = min((j.fit.point.cost for j in tried), default=base)
-        tried = [further(j) if j.fit.point.cost < 0.5 * (base + best) else j for j in tried]
-        singles = sorted([*singles, *tried], key=_worth)
-        singles = sorted([*(converge(j) for j in singles[:2]), *singles[2:]], key=_worth)
+        tried.sort(key=_worth)
+        leaders = [further(j) if j.fit.point.cost < 0.5 * (base + best) else j for j in tried[:LEADERS]]
+        singles = sorted([*singles, *leaders, *tried[LEADERS:]], key=_worth)
+        ended = [j if any(j is other for other in ended) else converge(j) for j in singles[:2]]
+        singles = sorted([*ended, *singles[2:]], key=_worth)
         if not singles:
             break
         cheapest = min(singles, key=lambda j: j.fit.point.cost)
         floor = floor_of(cheapest.likelihood, cheapest.fit, cheapest.fit.point.cost)
         choice = Choice(tuple(singles), None, base - floor, floor)
-        good = [j for j in singles[:4] if choice.enough(j) and unseen.helps(j)]
+        good = [j for j in singles[:LEADERS] if choice.enough(j) and unseen.helps(j)]
         good.sort(key=lambda j: -evidence(j, unseen))
         if good:
             first = simplest(good)

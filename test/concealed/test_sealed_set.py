@@ -68,7 +68,7 @@ def test_a_blind_process_can_do_everything_else(tmp_path: Path) -> None:
 )
 def test_a_sealed_world(suite: Suite) -> None:
     """The seal holds, the calibrator never opened the answer, and where it gives a verdict, it is right."""
-    line: Any = run(suite, suite.first_seed, "default", threads=1)
+    line: Any = run(suite, suite.first_seed, "default", threads=2)
     assert line["error"] is None, line["error"]
     marks = line["marks"]
     assert marks["verdict"] == "not_evaluated" or marks["right"], marks
