@@ -29,6 +29,8 @@ NATIVE := $(wildcard compass_ros/simulation/native/*.c)
 demo: install
 	$(BIN)/compass demo $(ARGS)
 
+# Two test processes on two cores: linear algebra must not start threads of its own.
+test: export OMP_NUM_THREADS = 1
 test: lint
 	$(BIN)/python -m pytest -n 2 -m "not ros" $(ARGS)
 	$(BIN)/python -m pytest -m ros $(ARGS)
