@@ -1,9 +1,10 @@
 """The default method, `causal-map`: which parameters matter is asked of the simulator, then their values are refined.
 
 The graph is the paper's, parameters to factors, but found by intervention: in a simulator every parameter can be moved
-alone. With e the change of a factor's trajectory per prior width and v = e^2 / sum of e^2 the parameter's share, psi is
-v / (v + 0.003) times e^2 / (e^2 + sigma^2): an edge carries more than the share at which the paper's sparsity weight
-drops one, and more than noise. The values are the maximum a posteriori of refine.py, with standard errors.
+alone. With e the change of a factor's trajectory per prior width and v the parameter's share of the sum of e^2 in a
+shot, averaged over shots (each has one vote, so that one whose collisions amplify everything does not decide for all),
+psi is v / (v + 0.003) times e^2 / (e^2 + sigma^2): an edge carries more than the share at which the paper's sparsity
+weight drops one, and more than noise. The values are the maximum a posteriori of refine.py, with standard errors.
 """
 
 from __future__ import annotations
@@ -86,8 +87,9 @@ def intervention_graph(problem: Problem, refined: Refined) -> Graph:
     there = likelihood.predict(np.repeat(values, episodes, axis=0), inputs, time)
     there = there.reshape(count + 1, episodes, *there.shape[1:])
     moved = problem.apart(there[1:], there[:1]) / INTERVENTION  # (P, E, F, K)
-    effect: Floats = np.sqrt(np.mean(moved**2, axis=(1, 2)))
-    share = effect**2 / np.maximum(np.sum(effect**2, axis=0), 1e-300)
+    of_shot: Floats = np.mean(moved**2, axis=2)  # (P, E, K)
+    share = np.mean(of_shot / np.maximum(np.sum(of_shot, axis=0), 1e-300), axis=1)
+    effect: Floats = np.sqrt(np.mean(of_shot, axis=1))
     noise = float(np.median(likelihood.sigma))
     psi = np.zeros((len(problem.parameters), len(problem.factors)))
     psi[moving] = share / (share + EDGE_SHARE) * effect**2 / (effect**2 + noise**2)

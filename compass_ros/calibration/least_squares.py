@@ -94,7 +94,8 @@ def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats) -
     episodes = len(likelihood.inputs)
     random = np.flatnonzero(likelihood.launch_std > 0)
     steps = steps * likelihood.prior_std[free]
-    steps = np.where(point.values[free] + steps > likelihood.high[free], -steps, steps)
+    there = point.values[free] + steps
+    steps = np.where((there > likelihood.high[free]) | (there < likelihood.low[free]), -steps, steps)
     columns = 1 + len(free) + len(random)
     values = np.tile(point.values, (columns, episodes, 1))
     inputs = np.tile(likelihood.inputs + point.launch, (columns, 1, 1))
@@ -109,6 +110,25 @@ def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats) -
     jacobian = np.moveaxis((residual[1 : 1 + len(free)] - residual[0]) * scale[:, None, None, None], 0, -1)
     launch = np.moveaxis((residual[1 + len(free) :] - residual[0]) * 10.0, 0, -1)
     return Linear(residual[0], jacobian, launch)
+
+
+def central(likelihood: Likelihood, point: Point, free: Ints, steps: Floats) -> Linear:
+    """The same with central differences: exact to second order, for twice the rollouts."""
+    up, down = linearise(likelihood, point, free, steps), linearise(likelihood, point, free, -steps)
+    jacobian = 0.5 * (up.jacobian + down.jacobian)
+    return Linear(up.residual, jacobian, up.launch_jacobian)
+
+
+def moved(likelihood: Likelihood, point: Point, free: Ints, move: Floats) -> Point:
+    """A point moved by (n,) standard deviations of the prior, inside the bounds."""
+    p = len(free)
+    values, launch = point.values.copy(), point.launch.copy()
+    values[free] = np.clip(
+        values[free] + likelihood.prior_std[free] * move[:p], likelihood.low[free], likelihood.high[free]
+    )
+    random = likelihood.launch_std > 0
+    launch[:, random] += move[p:].reshape(len(launch), -1) * likelihood.launch_std[random]
+    return Point(values, launch, np.inf)
 
 
 def difference_steps(linear: Linear) -> Floats:
@@ -254,9 +274,4 @@ def _step(likelihood: Likelihood, point: Point, free: Ints, hessian: Floats, gra
         move[outside] = np.clip(move[outside], low[outside], high[outside])
         held[outside] = True
     move[:p] = np.clip(move[:p], low, high)
-    values = point.values.copy()
-    values[free] = np.clip(values[free] + scale * move[:p], likelihood.low[free], likelihood.high[free])
-    launch = point.launch.copy()
-    random = likelihood.launch_std > 0
-    launch[:, random] += move[p:].reshape(len(launch), -1) * likelihood.launch_std[random]
-    return Point(values, launch, np.inf)
+    return moved(likelihood, point, free, move)

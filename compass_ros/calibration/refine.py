@@ -16,9 +16,12 @@ from compass_ros.calibration.least_squares import (
     Fit,
     Linear,
     Point,
+    central,
+    cost,
     difference_steps,
     linearise,
     minimise,
+    moved,
     normal_equations,
     start,
 )
@@ -42,6 +45,13 @@ ROBUST = 4.0
 
 CALM = 300.0
 """Movement of a frame by one prior width [sigma] above which it is trusted less; ordinary shots stay below."""
+
+SETTLING = 4
+"""Steps with central differences at the end."""
+_SHARES = (1.0, 0.5, 0.2)
+"""Parts of such a step, the longest that does no harm."""
+ROUGH = 2.0
+"""What such a step may cost [log likelihood]: less is the simulator's roughness."""
 
 SMALL = 0.3
 """Size of the changes that show the simulator's roughness, in steps of the differences: curvature must not count."""
@@ -128,7 +138,7 @@ def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True)
     watch("refine", 0.85, fit.point)
     rough = with_roughness(likelihood, fit)
     linear = scaled(fit.linear, likelihood, rough)
-    fit = minimise(rough, fit.point, felt, 8, ROBUST, tolerance=0.3, linear=linear)
+    fit = settled(rough, minimise(rough, fit.point, felt, 8, ROBUST, tolerance=0.3, linear=linear, fresh=False))
     watch("refine", 1.0, fit.point)
     spread = covariance(rough, fit)
     if many(likelihood):
@@ -142,6 +152,27 @@ def some(likelihood: Likelihood) -> Likelihood:
     """Of hundreds of parameters the strongest are asked of every third recording: enough to begin with."""
     episodes = len(likelihood.inputs)
     return likelihood.of(np.arange(0, episodes, 3)) if many(likelihood) and episodes >= 2 * 3 else likelihood
+
+
+def settled(likelihood: Likelihood, fit: Fit) -> Fit:
+    """The last steps to the optimum: plain Gauss-Newton with central differences.
+
+    Along a valley that coupled parameters share, one-sided differences lead astray by more than the error bars, and the
+    cost, rough by some units of log likelihood, says nothing of it. A step may therefore cost up to ROUGH.
+    """
+    linear = fit.linear
+    for _ in range(SETTLING):
+        steps = difference_steps(linear)
+        linear = central(likelihood, fit.point, fit.free, steps)
+        hessian, gradient = normal_equations(likelihood, fit.point, linear, fit.free, fit.robust)
+        move = -np.linalg.solve(hessian, gradient)
+        there = [moved(likelihood, fit.point, fit.free, share * move) for share in _SHARES]
+        costs, _ = cost(likelihood, [fit.point, *there], fit.robust)
+        best = next((i for i, reached in enumerate(costs[1:]) if reached < costs[0] + ROUGH), None)
+        if best is None:
+            break
+        fit = replace(fit, point=replace(there[best], cost=float(costs[1 + best])))
+    return replace(fit, linear=replace(linear, residual=residual_at(likelihood, fit.point)))
 
 
 def covariance(likelihood: Likelihood, fit: Fit) -> Floats:
