@@ -7,8 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compass_ros.calibration.least_squares import Point, cost, linearise, minimise, normal_equations, start
+from compass_ros.calibration.least_squares import (
+    Fit,
+    Point,
+    central,
+    cost,
+    linearise,
+    minimise,
+    normal_equations,
+    start,
+)
 from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.refine import settled
 from compass_ros.types import Floats
 from test.calibration.toys import likelihood, linear, oscillation
 
@@ -134,3 +144,31 @@ def test_exact_launches_are_not_touched() -> None:
 def test_running_out_of_iterations_is_said() -> None:
     given = likelihood(oscillation, (2.0,), INPUTS, sigma=0.001)
     assert not minimise(given, start(given, np.zeros(1)), np.array([0]), 1, PLAIN, tolerance=1e-12).converged
+
+
+def test_central_differences_are_exact_to_second_order() -> None:
+    given = likelihood(oscillation, [0.3], INPUTS)
+    point, free, steps = start(given, np.array([0.3])), np.array([0]), np.array([0.05])
+    phase = INPUTS[:, :1] * given.time_s
+    exact = -np.cos(6.3 * phase) * phase / given.sigma[:, :, 0] * -1.0
+    sides = [linearise(given, point, free, steps), central(given, point, free, steps)]
+    one, two = (np.abs(side.jacobian[:, :, 0, 0] - exact).max() for side in sides)
+    assert two < 0.05 * one
+
+
+def rippled(values: Floats, inputs: Floats, time_s: Floats) -> Floats:
+    """The linear model with ripples of a thirtieth of sigma in its parameters, as contacts make them."""
+    ripple = 3e-4 * np.sin(values @ np.array([300.0, 500.0, 700.0]))
+    return np.asarray(linear(values, inputs, time_s) + ripple[:, None, None] * np.cos(9 * time_s)[:, :, None])
+
+
+def test_ripples_of_the_cost_do_not_hold_a_fit_that_settles() -> None:
+    smooth = likelihood(linear, TRUTH, INPUTS, noise=0.01, frames=200)
+    given = replace(smooth, predict=rippled)
+    best = ridge(smooth)
+    off = replace(start(given, best + np.array([0.02, -0.06, 0.05])), cost=np.inf)
+    begun = Fit(off, linearise(given, off, FREE, np.full(3, 0.02)), FREE, PLAIN, 0, True)
+    hessian, _ = normal_equations(smooth, off, begun.linear, FREE, PLAIN)
+    error = np.sqrt(np.diag(np.linalg.inv(hessian)))
+    assert np.abs((off.values - best) / error).max() > 3
+    assert np.abs((settled(given, begun).point.values - best) / error).max() < 1
