@@ -74,7 +74,8 @@ def test_a_free_body_from_tables(run: Run, tmp_path: Path) -> None:
     (tmp_path / "lab.xml").write_text(SCENE.format(damping=-20))
     (tmp_path / "import.yaml").write_text(IMPORT)
     (tmp_path / "lab.yaml").write_text(CELL)
-    assert run("import", tmp_path / "import.yaml", "--out", tmp_path / "bags")[0] == 0
+    status, _, error = run("import", tmp_path / "import.yaml", "--out", tmp_path / "bags")
+    assert (status, error) == (0, "")
     words = ("--cell", tmp_path / "lab.yaml", "--out", tmp_path / "result", "--progress", "none")
     status, _, error = run("calibrate", *words, tmp_path / "bags")
     assert (status, error) == (0, "")
