@@ -33,8 +33,9 @@ def rivals(
     """Let parameters alone, sparse regression, a misspecification test and a Gaussian process judge the recordings."""
     from compass_ros.cells import load
     from compass_ros.config import calibration_config
-    from compass_ros.episodes import default_sources, read_episodes
+    from compass_ros.episodes import read_episodes
     from compass_ros.errors import ConfigError, nearest
+    from compass_ros.operation.current import sources
     from compass_ros.reporting.atomic import write_text
     from compass_ros.rivals.run import RIVALS, Recorded
 
@@ -46,8 +47,7 @@ def rivals(
     config = calibration_config(
         {"seed": seed, "rollouts": rollouts, "held_out_share": held_out, "threads": threads}, "command line"
     )
-    sources = default_sources([o.name for o in known.objects])
-    given = Recorded(read_episodes(bags, sources, known.name, known.hash), known, config)
+    given = Recorded(read_episodes(bags, sources(known), known.name, known.hash), known, config)
     said: dict[str, tuple[Opinion, float]] = {}
     for name in names:
         began = time.monotonic()

@@ -17,7 +17,6 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange
 from rclpy.action import ActionClient, ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
@@ -28,12 +27,12 @@ from compass_ros.nodes.job import Job, Outcome, Request
 from compass_ros.nodes.journal import cut_off
 from compass_ros.nodes.managed import ManagedNode
 from compass_ros.nodes.operator import Operator
+from compass_ros.nodes.qos import LATCHED
 from compass_ros.nodes.requests import checked_output, checked_paths, one_line
 from compass_ros.nodes.run import run
 from compass_ros.operation.desk import Desk
 from compass_ros.reporting.result_json import read_result
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 POLL_S = 0.05
 """[s] How often a running calibration is looked at: delay of its progress and of a cancel."""
 THREADS = 4

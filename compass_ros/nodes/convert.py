@@ -17,9 +17,10 @@ from compass_interfaces.msg import (
     SimParameter,
     SimParameters,
 )
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_msgs.msg import Header
 
+from compass_ros.nodes.diagnostic import diagnostic
 from compass_ros.nodes.job import Step
 
 Json = Mapping[str, Any]
@@ -161,10 +162,5 @@ def status_diagnostics(status: CalibrationStatus, node: str, header: Header) -> 
         "share done": f"{status.share_done:.3f}",
         "seconds left": f"{status.seconds_left:.0f}",
     }
-    one = DiagnosticStatus(
-        level=level,
-        name=f"{node}: calibration",
-        message=f"{word}: {status.message}" if status.message else word,
-        values=[KeyValue(key=key, value=value) for key, value in values.items()],
-    )
-    return DiagnosticArray(header=header, status=[one])
+    message = f"{word}: {status.message}" if status.message else word
+    return DiagnosticArray(header=header, status=[diagnostic(f"{node}: calibration", level, message, values)])

@@ -11,15 +11,16 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from compass_interfaces.msg import SimParameter, SimParameters
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import OccupancyGrid
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from compass_ros.errors import CompassError
+from compass_ros.nodes.diagnostic import diagnostic
+from compass_ros.nodes.qos import LATCHED
 from compass_ros.nodes.requests import one_line
 from compass_ros.nodes.seeing import grid_message, markers_message
 from compass_ros.operation.desk import Desk
@@ -27,7 +28,6 @@ from compass_ros.operation.mismatch_map import mismatch_map
 from compass_ros.operation.running_check import Verdict
 from compass_ros.reporting.result_json import read_result
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 CELL_SIZE_M = 0.02
 
 
@@ -91,8 +91,7 @@ class Operator:
             message += "; parameters are proposed: look at the report, then call ~/apply"
         if problem:
             level, message = DiagnosticStatus.WARN, f"{message}; {problem}"
-        pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
-        return DiagnosticStatus(level=level, name=f"{name}: simulator in force", message=message, values=pairs)
+        return diagnostic(f"{name}: simulator in force", level, message, values)
 
     def _on_apply(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         def apply() -> str:

@@ -8,19 +8,18 @@ from pathlib import Path
 from compass_interfaces.msg import EpisodeInfo
 from compass_interfaces.srv import StartEpisode, StopEpisode
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
 from compass_ros.episodes.recording import Recorder
 from compass_ros.episodes.writer import sync_bag
 from compass_ros.errors import BagError
 from compass_ros.nodes.managed import ManagedNode
+from compass_ros.nodes.qos import LATCHED
 from compass_ros.nodes.recorder_messages import episode_message, health_message
 from compass_ros.nodes.requests import checked_action, checked_text
 from compass_ros.nodes.run import run
 from compass_ros.nodes.topic_watch import TopicWatch
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 DISCOVERY_PERIOD_S = 0.2
 STATUS_PERIOD_S = 1.0
 

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 
 from builtin_interfaces.msg import Duration, Time
 from compass_interfaces.msg import EpisodeInfo
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 
 from compass_ros.episodes.notes import STATES, EpisodeHeader
+from compass_ros.nodes.diagnostic import diagnostic
 
 
 def episode_message(status: EpisodeHeader) -> EpisodeInfo:
@@ -34,9 +35,5 @@ def health_message(
     """`values`: numbers for people; `problems`: one sentence each."""
     said = [*problems, *filter(None, [status.message])]
     level = DiagnosticStatus.ERROR if status.state == "failed" else DiagnosticStatus.WARN
-    return DiagnosticStatus(
-        level=level if said else DiagnosticStatus.OK,
-        name=f"{name}: episodes",
-        message="; ".join(said) or status.state,
-        values=[KeyValue(key=str(key), value=str(value)) for key, value in values.items()],
-    )
+    level = level if said else DiagnosticStatus.OK
+    return diagnostic(f"{name}: episodes", level, "; ".join(said) or status.state, values)

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 
+from compass_ros.nodes.diagnostic import diagnostic
 from compass_ros.tracking.tracker import Frame
 
 _REMEMBERED, _FEW = 60, 5
@@ -70,12 +71,8 @@ def health_message(
         **{f"seen {name}": str(counts.seen.get(name, 0)) for name in objects},
         **{f"share of images with {name}": f"{counts.seen.get(name, 0) / images:.3f}" for name in objects},
     }
-    return DiagnosticStatus(
-        level=DiagnosticStatus.WARN if problems else DiagnosticStatus.OK,
-        name=f"{name}: tracking",
-        message="; ".join(problems) or "tracking",
-        values=[KeyValue(key=key, value=value) for key, value in values.items()],
-    )
+    level = DiagnosticStatus.WARN if problems else DiagnosticStatus.OK
+    return diagnostic(f"{name}: tracking", level, "; ".join(problems) or "tracking", values)
 
 
 def _quantile(values: Sequence[float], share: float) -> str:

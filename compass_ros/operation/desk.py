@@ -10,7 +10,7 @@ from compass_ros.cells import Cell
 from compass_ros.config import read_yaml
 from compass_ros.episodes import find_bags
 from compass_ros.errors import BagError, CompassError, ConfigError, DataError
-from compass_ros.operation.current import Current, Residuals, current, read
+from compass_ros.operation.current import Current, Residuals, current, held_out_bags, read
 from compass_ros.operation.running_check import RunningCheck, Verdict
 from compass_ros.operation.versions import Version, Versions
 from compass_ros.reporting.result_json import read_result
@@ -107,7 +107,7 @@ class Desk:
     def _held_out(self, version: Version) -> Sequence[Path]:
         names = read_result(version.folder / RESULT)["episodes"]["held_out"]
         try:
-            return [bag for bag in find_bags(self._bags(version.folder)) if bag.name in names]
+            return held_out_bags(self._bags(version.folder), names)
         except CompassError:
             return []
 

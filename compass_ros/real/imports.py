@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from compass_ros.cells import Cell
-from compass_ros.episodes import Source, read_episodes
+from compass_ros.episodes import read_episodes
 from compass_ros.episodes.tables import import_tables
+from compass_ros.operation.current import sources
 from compass_ros.types import Episode
 
 IMPORTS = Path(__file__).parents[2] / "config" / "import"
@@ -20,5 +21,4 @@ def episodes(cell: Cell, name: str, out: Path, data: Path | None) -> tuple[Episo
     folder = out / "bags" / name
     if not folder.is_dir():
         import_tables(IMPORTS / f"{name}.yaml", folder, data)
-    sources = [Source(o.topic, o.name, o.quantity) for o in cell.objects]
-    return tuple(sorted(read_episodes([folder], sources, cell.name), key=lambda e: e.name))
+    return tuple(sorted(read_episodes([folder], sources(cell), cell.name), key=lambda e: e.name))
