@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from compass_ros.reporting.markdown import replace_between
 from compass_ros.simulation.effects import EFFECTS, Quantity
 
 PAGE = Path(__file__).parents[1] / "docs" / "effects.md"
@@ -38,16 +39,5 @@ def _described(quantity: Quantity) -> str:
     return f"`{quantity.name}`: {quantity.low:g} to {quantity.high:g} [{quantity.unit}]{kind}"
 
 
-def documented(page: str) -> str:
-    """The table that stands in a page."""
-    return page.partition(BEGIN)[2].partition(END)[0]
-
-
-def main() -> None:
-    page = PAGE.read_text(encoding="utf-8")
-    before, after = page.partition(BEGIN)[0], page.partition(END)[2]
-    PAGE.write_text(f"{before}{BEGIN}{table()}{END}{after}", encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    replace_between(PAGE, BEGIN, END, table())

@@ -37,6 +37,7 @@ from std_srvs.srv import Trigger
 
 from compass_ros.episodes import Source, read_episode
 from compass_ros.nodes.images import stamp_ns
+from compass_ros.reporting.markdown import markdown_table, replace_between
 
 ROOT = Path(__file__).parents[1]
 EPISODE_S, SAMPLE_S, WARM_UP_S = 10.0, 2.0, 20.0
@@ -45,7 +46,7 @@ PATIENCE_S = 120.0
 LATENCY_P99_MS, GROWTH_MIB_PER_HOUR = 20.0, 30.0
 ARM = "/arm/pose"
 TRACKED = [f"/puck_tracker/{name}/pose" for name in ("puck1", "puck2", "pusher")]
-BEGIN, END = "<!-- soak: written by scripts/soak.py -->", "<!-- /soak -->"
+BEGIN, END = "<!-- soak: written by scripts/soak.py -->\n", "<!-- /soak -->"
 
 
 @dataclass
@@ -236,7 +237,7 @@ def table(result: Mapping[str, Any]) -> str:
         "calibrations meanwhile": f"{result['calibrations']} ended well, {result['failed_calibrations']} failed",
         "memory": memory,
     }
-    return "\n".join(["| | |", "|---|---|", *(f"| {name} | {text} |" for name, text in rows.items())])
+    return markdown_table(("", ""), rows.items())
 
 
 def broken(result: Mapping[str, Any]) -> list[str]:
@@ -250,13 +251,6 @@ def broken(result: Mapping[str, Any]) -> list[str]:
         if memory["growth_an_hour"] > GROWTH_MIB_PER_HOUR:
             said.append(f"{name} grows by {memory['growth_an_hour']} MiB an hour")
     return said
-
-
-def show(result: Mapping[str, Any], page: Path) -> None:
-    """Put the table between the marks of the page."""
-    before, _, rest = page.read_text().partition(BEGIN)
-    _, _, after = rest.partition(END)
-    page.write_text(f"{before}{BEGIN}\n{table(result)}\n{END}{after}")
 
 
 def main() -> int:
@@ -274,7 +268,7 @@ def main() -> int:
         result = soak(options.minutes, Path(folder))
     options.json.write_text(json.dumps(result, indent=1) + "\n")
     if options.page.exists():
-        show(result, options.page)
+        replace_between(options.page, BEGIN, END, table(result) + "\n")
     print(table(result))
     for promise in (promises := broken(result)):
         print(f"BROKEN: {promise}")

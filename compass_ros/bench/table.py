@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from statistics import fmean, stdev
 
 from compass_ros.bench.outcome import Row, case_of
+from compass_ros.reporting.markdown import markdown_table
 
 PAPER_MAPE = {"compass": 0.22, "npdr": 0.29, "exi-net": 0.95, "tune-net": 3.85}
 """Mean absolute percentage error of the 8 causal parameters of air hockey, 5 seeds (caption of the paper's figure)."""
@@ -33,7 +34,7 @@ def table(rows: Sequence[Row]) -> str:
     header += ["wall [s]"]
     if main:
         header.insert(3, "paper's MAPE")
-    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    lines = []
     for name in methods:
         own = _of(rows, name)
         identified = f"{cell(own, number('mape_identified'))} ({mean(own, lambda r: len(_list(r, 'identified'))):.1f})"
@@ -44,8 +45,8 @@ def table(rows: Sequence[Row]) -> str:
         cells += [cell(own, number("wall_seconds"))]
         if main:
             cells.insert(3, f"{PAPER_MAPE[name]:.2f}" if name in PAPER_MAPE else "-")
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+        lines.append(cells)
+    return markdown_table(header, lines)
 
 
 def number(field: str) -> Read:

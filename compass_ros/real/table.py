@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from compass_ros.reporting.markdown import markdown_table
+
 
 @dataclass(frozen=True)
 class Table:
@@ -15,8 +17,7 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
     def markdown(self) -> str:
-        lines = [f"### {self.title}", "", "| " + " | ".join(self.columns) + " |", "|" + "---|" * len(self.columns)]
-        return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in self.rows])
+        return f"### {self.title}\n\n{markdown_table(self.columns, self.rows)}"
 
 
 @dataclass(frozen=True)

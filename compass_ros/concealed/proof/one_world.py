@@ -8,7 +8,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,23 +42,46 @@ SUITES: Mapping[str, Suite] = {
 """main: the mix of the table. small: effects of 0.5 mm. tracker: a tracker's noise. like: the library's formulas."""
 
 
-def run(suite: Suite, seed: int, method: str, threads: int) -> dict[str, object]:
-    """Marks of one world, ready for its line; where a step failed, `error` says which and why."""
+@dataclass(frozen=True)
+class Concealed:
+    """A world on disk."""
+
+    root: Path
+    world: Path
+    """The bags."""
+    answers: Path
+    error: str
+    """Why there is none; empty where there is one."""
+    seconds: float
+
+    def blindly(self, *words: str) -> tuple[str, float]:
+        """A command of the suite that cannot read the answers: what went wrong, and how long it took [s]."""
+        blind = [sys.executable, "-m", "compass_ros.concealed.blind", str(self.answers), *words]
+        return _timed(blind, self.root)
+
+
+@contextmanager
+def concealed(suite: Suite, seed: int) -> Iterator[Concealed]:
+    """A world of a suite in a folder that is gone afterwards, made by the real command line."""
     with tempfile.TemporaryDirectory(prefix="compass_proof_") as folder:
         root = Path(folder)
-        world, answers, out = root / "world", root / "answers", root / "result"
-        began = time.monotonic()
+        world, answers = root / "world", root / "answers"
         conceal = ["conceal", "--seed", str(seed), "--out", str(world), "--answers", str(answers), *suite.options]
-        error = call([sys.executable, "-m", "compass_ros.cli", *conceal], root)
-        concealed = time.monotonic()
-        if error:
-            return {"error": f"conceal: {error}"}
-        (root / "config.json").write_text(json.dumps({"threads": threads}), encoding="utf-8")
-        given = ["--method", method, "--config", str(root / "config.json"), "--progress", "none", "--out", str(out)]
-        blind = [sys.executable, "-m", "compass_ros.concealed.blind", str(answers), "calibrate", str(world), *given]
-        error = call(blind, root)
-        seconds = {"conceal": round(concealed - began, 2), "calibrate": round(time.monotonic() - concealed, 2)}
-        opened = unseal(world, answers)
+        error, seconds = _timed([sys.executable, "-m", "compass_ros.cli", *conceal], root)
+        yield Concealed(root, world, answers, f"conceal: {error}" if error else "", seconds)
+
+
+def run(suite: Suite, seed: int, method: str, threads: int) -> dict[str, object]:
+    """Marks of one world, ready for its line; where a step failed, `error` says which and why."""
+    with concealed(suite, seed) as made:
+        if made.error:
+            return {"error": made.error}
+        config, out = made.root / "config.json", made.root / "result"
+        config.write_text(json.dumps({"threads": threads}), encoding="utf-8")
+        given = ["--method", method, "--config", str(config), "--progress", "none", "--out", str(out)]
+        error, took = made.blindly("calibrate", str(made.world), *given)
+        seconds = {"conceal": made.seconds, "calibrate": took}
+        opened = unseal(made.world, made.answers)
         if error:
             truth = [effect["name"] for effect in _effects(opened.answer)]
             return {"error": f"calibrate: {error}", "seconds": seconds, "kind": opened.answer["kind"], "truth": truth}
@@ -84,7 +108,13 @@ def _effects(answer: Mapping[str, object]) -> list[Mapping[str, object]]:
     return effects
 
 
-def call(command: list[str], folder: Path) -> str:
+def _timed(command: list[str], folder: Path) -> tuple[str, float]:
+    began = time.monotonic()
+    error = _call(command, folder)
+    return error, round(time.monotonic() - began, 2)
+
+
+def _call(command: list[str], folder: Path) -> str:
     """Run to the end; what went wrong as one line, empty where nothing did. One thread for linear algebra."""
     quiet = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     try:

@@ -8,10 +8,9 @@ from pathlib import Path
 
 from compass_ros.concealed.proof.lines import Line
 from compass_ros.concealed.proof.statistics import Row, table
-from compass_ros.errors import ConfigError
-from compass_ros.reporting.atomic import write_text
+from compass_ros.reporting.markdown import markdown_table, replace_between
 
-BEGIN, END = "<!-- proof: begin -->", "<!-- proof: end -->"
+BEGIN, END = "<!-- proof: begin -->\n", "<!-- proof: end -->"
 
 
 def groups(found: Iterable[Line]) -> Mapping[tuple[str, str], list[Line]]:
@@ -34,11 +33,9 @@ def markdown(found: Iterable[Line]) -> str:
 
 
 def _table(rows: Sequence[Row]) -> str:
-    lines = ["| | to reach | reached | 95 % interval | of | |", "|---|---|---|---|---|---|"]
-    for row in rows:
-        verdict = {True: "yes", False: "**no**", None: ""}[row.reached]
-        lines.append(f"| {row.what} | {row.bar} | {row.value} | {row.interval} | {row.count} | {verdict} |")
-    return "\n".join(lines) + "\n"
+    verdict = {True: "yes", False: "**no**", None: ""}
+    cells = [(row.what, row.bar, row.value, row.interval, row.count, verdict[row.reached]) for row in rows]
+    return markdown_table(("", "to reach", "reached", "95 % interval", "of", ""), cells) + "\n"
 
 
 def _wrong(among: Sequence[Line]) -> str:
@@ -53,23 +50,10 @@ def _wrong(among: Sequence[Line]) -> str:
             said[" + ".join(marks["truth"]) or "nothing", marks["verdict"] + (f": {names}" if names else "")] += 1
     if not said:
         return "No world came out wrong.\n"
-    rows = [f"| {true} | {instead} | {count} |" for (true, instead), count in sorted(said.items())]
-    return "\n".join(["| true | said instead | worlds |", "|---|---|---|", *rows]) + "\n"
+    rows = [(true, instead, str(count)) for (true, instead), count in sorted(said.items())]
+    return markdown_table(("true", "said instead", "worlds"), rows) + "\n"
 
 
 def write_page(path: Path, found: Iterable[Line]) -> None:
     """Replace what stands between the markers. Raises ConfigError where the page has none."""
     replace_between(path, BEGIN, END, markdown(found))
-
-
-def replace_between(path: Path, begin: str, end: str, content: str) -> None:
-    """Replace what stands between two markers of a text file. Raises ConfigError where it has none."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
-    before, first, rest = text.partition(begin)
-    _, last, after = rest.partition(end)
-    if not first or not last:
-        raise ConfigError(f"{path}: expected the markers {begin} and {end}")
-    write_text(path, f"{before}{begin}\n{content}{end}{after}")

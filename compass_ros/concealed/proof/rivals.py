@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import json
-import sys
-import tempfile
-import time
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from compass_ros.concealed.comparison import judge_names
 from compass_ros.concealed.proof.campaign import RunWorld
-from compass_ros.concealed.proof.one_world import SUITES, Suite, call
+from compass_ros.concealed.proof.one_world import SUITES, Suite, concealed
 from compass_ros.concealed.seal import unseal
 
 METHOD = "rivals"
@@ -30,22 +26,17 @@ def in_processes(threads: int) -> RunWorld:
 
 def run(suite: Suite, seed: int, threads: int, rivals: Sequence[str] = ()) -> dict[str, object]:
     """Marks of all rivals (or some) on one world, ready for its line; `error` says which step failed and why."""
-    with tempfile.TemporaryDirectory(prefix="compass_rivals_") as folder:
-        root = Path(folder)
-        world, answers, out = root / "world", root / "answers", root / "rivals.json"
-        began = time.monotonic()
-        conceal = ["conceal", "--seed", str(seed), "--out", str(world), "--answers", str(answers), *suite.options]
-        error = call([sys.executable, "-m", "compass_ros.cli", *conceal], root)
-        concealed = time.monotonic()
-        if error:
-            return {"error": f"conceal: {error}"}
+    with concealed(suite, seed) as made:
+        if made.error:
+            return {"error": made.error}
         asked = [part for name in rivals for part in ("--rival", name)]
-        given = ["rivals", str(world), "--threads", str(threads), "--out", str(out), "--quiet", *asked]
-        error = call([sys.executable, "-m", "compass_ros.concealed.blind", str(answers), *given], root)
-        seconds = {"conceal": round(concealed - began, 2), "rivals": round(time.monotonic() - concealed, 2)}
-        answer: Any = unseal(world, answers).answer
+        out = made.root / "rivals.json"
+        error, took = made.blindly(
+            "rivals", str(made.world), "--threads", str(threads), "--out", str(out), "--quiet", *asked
+        )
+        answer: Any = unseal(made.world, made.answers).answer
         about = {
-            "seconds": seconds,
+            "seconds": {"conceal": made.seconds, "rivals": took},
             "kind": answer["kind"],
             "truth": [effect["name"] for effect in answer["effects"]],
             "rms_m": [effect["rms_m"] for effect in answer["effects"]],

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
 
 from compass_ros.concealed.proof.lines import Line
-from compass_ros.concealed.proof.page import replace_between
+from compass_ros.concealed.proof.statistics import wilson
+from compass_ros.reporting.markdown import markdown_table, replace_between
 
-BEGIN, END = "<!-- rivals: begin -->", "<!-- rivals: end -->"
+BEGIN, END = "<!-- rivals: begin -->\n", "<!-- rivals: end -->"
 OURS = "compass_ros"
 HEAD = (
     *("method", "one effect: named right", "two effects: both", "outside the library: misnamed"),
@@ -60,8 +60,7 @@ def markdown(rivals: Iterable[Line], ours: Iterable[Line]) -> str:
         commits = ", ".join(sorted({str(line["commit"]) for line in among}))
         failed = sum(1 for line in among if not line.get("rivals"))
         parts.append(f"### {suite}: {len(among)} worlds, {failed} of them failed (commit {commits})\n")
-        cells = [HEAD, ("---",) * len(HEAD), *rows(among, own)]
-        parts.append("\n".join(f"| {' | '.join(row)} |" for row in cells) + "\n")
+        parts.append(markdown_table(HEAD, rows(among, own)) + "\n")
     return "\n".join(parts) or "No run yet.\n"
 
 
@@ -108,9 +107,7 @@ def _share(said: Sequence[Said], mark: Callable[[Said], bool | None]) -> str:
     outcomes = [m for m in map(mark, said) if m is not None]
     if not outcomes:
         return "n/a" if said else "-"
-    hits, count = sum(outcomes), len(outcomes)
-    interval = binomtest(hits, count).proportion_ci(0.95, method="wilson")
-    return f"{hits} of {count} ({100 * interval.low:.0f} to {100 * interval.high:.0f} %)"
+    return f"{sum(outcomes)} of {len(outcomes)} ({wilson(outcomes)})"
 
 
 def _median(values: Sequence[float], digits: int) -> str:

@@ -53,6 +53,12 @@ def table(found: Sequence[Line]) -> list[Row]:
     ]
 
 
+def wilson(outcomes: Sequence[bool]) -> str:
+    """Interval of the share of True (Wilson 1927), as in '83 to 99 %'."""
+    interval = binomtest(int(np.sum(outcomes)), len(outcomes)).proportion_ci(_LEVEL, method="wilson")
+    return f"{100 * interval.low:.0f} to {100 * interval.high:.0f} %"
+
+
 def _marks(line: Line) -> dict[str, Any]:
     return dict(line.get("marks") or {})
 
@@ -80,11 +86,9 @@ def _proportion(what: str, outcomes: Sequence[bool], bar: float, most: bool = Fa
     if not outcomes:
         return Row(what, text, "-", "-", "0", None)
     hits, count = int(np.sum(outcomes)), len(outcomes)
-    interval = binomtest(hits, count).proportion_ci(_LEVEL, method="wilson")
     share = hits / count
     reached = share <= bar if most else share >= bar
-    limits = f"{100 * interval.low:.0f} to {100 * interval.high:.0f} %"
-    return Row(what, text, f"{100 * share:.0f} %", limits, f"{hits} of {count}", reached)
+    return Row(what, text, f"{100 * share:.0f} %", wilson(outcomes), f"{hits} of {count}", reached)
 
 
 def _between(what: str, outcomes: Sequence[bool], low: float, high: float) -> Row:

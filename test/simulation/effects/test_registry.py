@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from compass_ros.errors import ConfigError
+from compass_ros.reporting.markdown import between
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached, Effect, effect
 from compass_ros.types import Floats
-from scripts.effects_table import PAGE, documented, formula, table
+from scripts.effects_table import BEGIN, END, PAGE, formula, table
 from test.simulation.table import DESCRIBED, WIDE, cell, simulator, values
 
 UNITS = {"1", "m", "s", "rad", "Hz", "m/s", "m/s^2", "1/m", "1/s", "s/m", "1/m^2"}
@@ -96,4 +97,4 @@ def test_the_formula_names_every_quantity_and_the_text_its_source(name: str) -> 
 
 def test_the_documented_table_is_that_of_the_registry() -> None:
     """`python scripts/effects_table.py` writes it anew."""
-    assert documented(PAGE.read_text(encoding="utf-8")) == table()
+    assert between(PAGE.read_text(encoding="utf-8"), BEGIN, END) == table()
