@@ -34,6 +34,7 @@ CAMERA = {
     "distortion_coefficients": {"data": [0.0] * 5},
 }
 
+
 @pytest.fixture(scope="module")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """One sound bag."""

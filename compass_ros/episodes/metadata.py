@@ -12,7 +12,6 @@ from compass_ros.errors import BagError
 from compass_ros.plain_yaml import LARGEST, plain_yaml
 
 FILE_NAME = "metadata.yaml"
-_LARGEST = LARGEST
 
 
 @dataclass(frozen=True)
@@ -59,8 +58,8 @@ def read_summary(folder: Path) -> BagSummary:
     """Read metadata.yaml of any rosbag2 version. Raises BagError with one line."""
     path = folder / FILE_NAME
     try:
-        if path.stat().st_size > _LARGEST:
-            raise BagError(f"{path}: larger than {_LARGEST} bytes; expected a rosbag2 metadata.yaml")
+        if path.stat().st_size > LARGEST:
+            raise BagError(f"{path}: larger than {LARGEST} bytes; expected a rosbag2 metadata.yaml")
         content = plain_yaml(path.read_text(encoding="utf-8"))
         information = content["rosbag2_bagfile_information"]
         return BagSummary(
@@ -74,7 +73,7 @@ def read_summary(folder: Path) -> BagSummary:
         )
     except OSError as error:
         raise BagError(f"{path}: cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, RecursionError, OverflowError) as error:
+    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         found = " ".join(str(error).split())[:200]
         raise BagError(f"{path}: expected a rosbag2 metadata.yaml, found {type(error).__name__}: {found}") from error
 
@@ -83,7 +82,7 @@ def qos_profiles(text: str) -> list[object]:
     """The profiles in a YAML text as bags hold it; none where the text is something else."""
     try:
         found = plain_yaml(text)
-    except (yaml.YAMLError, ValueError, RecursionError):
+    except (yaml.YAMLError, ValueError):
         return []
     return found if isinstance(found, list) else []
 
