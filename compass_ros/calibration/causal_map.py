@@ -15,14 +15,11 @@ import numpy as np
 
 from compass_ros.calibration.least_squares import Point, start
 from compass_ros.calibration.problem import Allowance, Problem
-from compass_ros.calibration.refine import Refined, refine, standard_errors
-from compass_ros.calibration.screen import moved_by
+from compass_ros.calibration.refine import COARSE, Refined, refine, standard_errors
 from compass_ros.types import Estimate, Floats, Graph, Iteration, Progress, Report
 
 EDGE_SHARE = 0.003
 """Share of all change above which a parameter is a cause: the paper's sparsity weight, for standardised differences."""
-INTERVENTION = 0.3
-"""How far a parameter is moved to see what it causes, in prior widths."""
 IDENTIFIED = 0.5
 """A parameter is identified where the recordings shrink its prior width at least to this share."""
 
@@ -71,26 +68,20 @@ def to_estimate(problem: Problem, refined: Refined, trace: tuple[Iteration, ...]
 
 
 def intervention_graph(problem: Problem, refined: Refined) -> Graph:
-    """psi from interventions at the estimate: how far each prior width moves each factor's trajectory.
+    """psi from interventions near the estimate: how far each prior width moves each factor's trajectory.
 
-    What moved nothing when the refinement asked is not moved again and has no edge; of hundreds of parameters, neither
-    has what another one stands for.
+    They are those by which the refinement asked what to free. What moved nothing has no edge; of hundreds of
+    parameters, neither has what another one stands for.
     """
-    likelihood, point = refined.likelihood, refined.fit.point
-    moving = refined.asked
-    count, episodes = len(moving), len(problem.actions)
-    steps = moved_by(likelihood, point, INTERVENTION)
-    values = np.tile(point.values, (count + 1, 1))
-    values[1 + np.arange(count), moving] += steps[moving]
-    index = np.tile(np.arange(episodes), count + 1)
-    inputs, time = (likelihood.inputs + point.launch)[index], likelihood.time_s[index]
-    there = likelihood.predict(np.repeat(values, episodes, axis=0), inputs, time)
-    there = there.reshape(count + 1, episodes, *there.shape[1:])
-    moved = problem.apart(there[1:], there[:1]) / INTERVENTION  # (P, E, F, K)
+    likelihood, influence, asked = refined.likelihood, refined.influence, refined.asked
+    values = np.tile(influence.point.values, (len(problem.actions), 1))
+    there = likelihood.predict(values, likelihood.inputs + influence.point.launch, likelihood.time_s)
+    moves = COARSE * np.moveaxis(influence.changes[..., asked], -1, 0)
+    moved = problem.apart(there + moves, there[None]) / COARSE  # (P, E, F, K)
     of_shot: Floats = np.mean(moved**2, axis=2)  # (P, E, K)
     share = np.mean(of_shot / np.maximum(np.sum(of_shot, axis=0), 1e-300), axis=1)
     effect: Floats = np.sqrt(np.mean(of_shot, axis=1))
     noise = float(np.median(likelihood.sigma))
     psi = np.zeros((len(problem.parameters), len(problem.factors)))
-    psi[moving] = share / (share + EDGE_SHARE) * effect**2 / (effect**2 + noise**2)
+    psi[asked] = share / (share + EDGE_SHARE) * effect**2 / (effect**2 + noise**2)
     return Graph(tuple(p.name for p in problem.parameters), problem.factors, psi, 0.5)

@@ -70,13 +70,19 @@ def cost(likelihood: Likelihood, points: list[Point], robust: float) -> tuple[Fl
     inputs = np.concatenate([likelihood.inputs + p.launch for p in points])
     flat = likelihood.residual(values, inputs, np.tile(np.arange(episodes), len(points)))
     residual = flat.reshape(len(points), episodes, *flat.shape[1:])
-    of_point = _rho(residual, robust).reshape(len(points), -1).sum(axis=1)
+    of_point = robust_loss(residual, robust).reshape(len(points), -1).sum(axis=1)
     return np.array([0.5 * c + _prior(likelihood, p) for c, p in zip(of_point, points, strict=True)]), residual
 
 
-def _rho(residual: Floats, robust: float) -> Floats:
+def robust_loss(residual: Floats, robust: float) -> Floats:
+    """rho of each residual: its square where it is small beside the scale, twice the scale times it where large."""
     squared = residual**2
     return np.asarray(2 * squared / (np.sqrt(1 + squared / robust**2) + 1))  # stable for large scales
+
+
+def robust_weight(residual: Floats, robust: float) -> Floats:
+    """Factor of each squared residual that gives the robust loss's gradient: 1 where small, falling where large."""
+    return np.asarray(1 / np.sqrt(1 + (residual / robust) ** 2))
 
 
 def _prior(likelihood: Likelihood, point: Point) -> float:
@@ -86,16 +92,21 @@ def _prior(likelihood: Likelihood, point: Point) -> float:
     return 0.5 * float(np.sum(scaled**2) + np.sum(launch**2))
 
 
-def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats) -> Linear:
-    """Residual and one-sided differences at a point; (p,) steps in standard deviations of the prior.
+def inward(likelihood: Likelihood, point: Point, which: Ints, steps: Floats) -> Floats:
+    """(p,) changes of some parameters in their units, from steps in standard deviations of the prior.
 
     A step that would leave the bounds is taken to the other side.
     """
+    changes = steps * likelihood.prior_std[which]
+    there = point.values[which] + changes
+    return np.where((there > likelihood.high[which]) | (there < likelihood.low[which]), -changes, changes)
+
+
+def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats) -> Linear:
+    """Residual and one-sided differences at a point; (p,) steps in standard deviations of the prior, as in `inward`."""
     episodes = len(likelihood.inputs)
     random = np.flatnonzero(likelihood.launch_std > 0)
-    steps = steps * likelihood.prior_std[free]
-    there = point.values[free] + steps
-    steps = np.where((there > likelihood.high[free]) | (there < likelihood.low[free]), -steps, steps)
+    steps = inward(likelihood, point, free, steps)
     columns = 1 + len(free) + len(random)
     values = np.tile(point.values, (columns, episodes, 1))
     inputs = np.tile(likelihood.inputs + point.launch, (columns, 1, 1))
@@ -145,7 +156,7 @@ def normal_equations(
     likelihood: Likelihood, point: Point, linear: Linear, free: Ints, robust: float
 ) -> tuple[Floats, Floats]:
     """(n, n) Gauss-Newton Hessian and (n,) gradient in units of the prior's standard deviations, prior included."""
-    weight = 1 / np.sqrt(1 + (linear.residual / robust) ** 2)
+    weight = robust_weight(linear.residual, robust)
     episodes, p, launches = len(likelihood.inputs), len(free), linear.launch_jacobian.shape[-1]
     n = p + episodes * launches
     hessian, gradient = np.eye(n), np.zeros(n)
@@ -197,12 +208,12 @@ def minimise(
             linear, steps = _linearise_well(likelihood, point, free, steps)
             exact = True
         hessian, gradient = normal_equations(likelihood, point, linear, free, robust)
-        trials = [_step(likelihood, point, free, hessian, gradient, damping * factor) for factor in _TRIALS]
+        trials = [damped_step(likelihood, point, free, hessian, gradient, damping * factor) for factor in _TRIALS]
         costs, residuals = cost(likelihood, trials, robust)
         best = int(np.argmin(costs))
         gained = point.cost - float(costs[best])
         if gained > 0:
-            move = _move(likelihood, point, trials[best], free)
+            move = move_between(likelihood, point, trials[best], free)
             hoped = -float(gradient @ move + 0.5 * move @ hessian @ move)
             damping = max(damping * _TRIALS[best], 1e-9)
             point = replace(trials[best], cost=float(costs[best]))
@@ -230,7 +241,7 @@ def _linearise_well(likelihood: Likelihood, point: Point, free: Ints, steps: Flo
     return linear, better
 
 
-def _move(likelihood: Likelihood, old: Point, new: Point, free: Ints) -> Floats:
+def move_between(likelihood: Likelihood, old: Point, new: Point, free: Ints) -> Floats:
     """(n,) step from one point to another in standard deviations of the prior."""
     random = likelihood.launch_std > 0
     values = (new.values - old.values)[free] / likelihood.prior_std[free]
@@ -254,8 +265,13 @@ def _broyden(linear: Linear, residual: Floats, move: Floats) -> Linear:
     )
 
 
-def _step(likelihood: Likelihood, point: Point, free: Ints, hessian: Floats, gradient: Floats, damping: float) -> Point:
-    """A damped step, kept inside the bounds: what would leave them stays on them and the rest is solved again."""
+def damped_step(
+    likelihood: Likelihood, point: Point, free: Ints, hessian: Floats, gradient: Floats, damping: float
+) -> Point:
+    """A step with the Hessian's diagonal raised by a share.
+
+    It is kept inside the bounds: what would leave them stays on them and the rest is solved again.
+    """
     p = len(free)
     scale = likelihood.prior_std[free]
     low = (likelihood.low[free] - point.values[free]) / scale

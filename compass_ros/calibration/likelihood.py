@@ -70,6 +70,10 @@ class Likelihood:
             sigma=self.sigma[episodes],
         )
 
+    def on(self, other: Likelihood) -> Likelihood:
+        """The same model and prior for the recordings of another likelihood."""
+        return replace(self, inputs=other.inputs, time_s=other.time_s, measured=other.measured, sigma=other.sigma)
+
     def residual(self, values: Floats, inputs: Floats, episode: Ints) -> Floats:
         """(B, F, C) residuals in sigma for (B, P) values and (B, A) inputs; 0 where nothing was measured."""
         predicted = self.predict(values, inputs, self.time_s[episode])

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from compass_ros.types import Floats
+from compass_ros.types import Bools, Floats
 
+MOST_CORRELATED = 0.98
+"""Beyond it, a residual says nothing of how often it was measured."""
 _MIN_STILL = 5
 """Frames before the command that an episode needs to count as still."""
 _WORSE = 1.25
@@ -38,7 +40,33 @@ class Noise:
     @property
     def correlation_time(self) -> float:
         """Frames that one independent measurement is worth."""
-        return (1 + self.correlation) / (1 - self.correlation)
+        return correlation_time(self.correlation)
+
+
+def correlation_time(correlation: float) -> float:
+    """Frames of an AR(1) process that one independent number is worth, from the correlation of neighbours."""
+    return (1 + correlation) / (1 - correlation)
+
+
+def correlation_of(time: float) -> float:
+    """Correlation of neighbours from the correlation time."""
+    return (time - 1) / (time + 1)
+
+
+def neighbour_correlation(residual: Floats, seen: Bools) -> float:
+    """Correlation of neighbouring frames in (E, F, C) residuals, from 0 to MOST_CORRELATED."""
+    both = seen[:, 1:] & seen[:, :-1]
+    product = np.sum(np.where(both, residual[:, 1:] * residual[:, :-1], 0.0))
+    square = np.sum(np.where(both, residual[:, 1:] ** 2 + residual[:, :-1] ** 2, 0.0)) / 2
+    return float(np.clip(product / max(square, 1e-300), 0.0, MOST_CORRELATED))
+
+
+def correlated(white: Floats, correlation: float) -> Floats:
+    """(E, F, C) AR(1) noise of unit variance along the frames, from white noise."""
+    out = white.copy()
+    for frame in range(1, white.shape[1]):
+        out[:, frame] = correlation * out[:, frame - 1] + np.sqrt(1 - correlation**2) * white[:, frame]
+    return out
 
 
 def measure_noise(time_s: Floats, measured: Floats, expected: float, stated: Floats | None = None) -> Noise:
@@ -57,7 +85,7 @@ def _measured_noise(time_s: Floats, measured: Floats, expected: float) -> Noise:
         flight, _ = _flight_noise(measured)
         return Noise(np.where(np.isnan(flight), expected, flight), 0.0)
     at_rest, correlation = _at_rest(still)
-    repeated = (1 + correlation) / (1 - correlation)
+    repeated = correlation_time(correlation)
     flight, of_flight = _flight_noise(np.where(time_s[:, :, None] < 0, np.nan, measured))
     if correlation > _FOLLOWS:
         of_flight = np.zeros_like(of_flight)

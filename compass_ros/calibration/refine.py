@@ -18,14 +18,16 @@ from compass_ros.calibration.least_squares import (
     Point,
     central,
     cost,
+    damped_step,
     difference_steps,
     linearise,
     minimise,
-    moved,
+    move_between,
     normal_equations,
     start,
 )
 from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.noise import correlation_time, neighbour_correlation
 from compass_ros.calibration.screen import WORTH, acting, coupling, independent, many
 from compass_ros.types import Floats, Ints
 
@@ -46,12 +48,14 @@ ROBUST = 4.0
 CALM = 300.0
 """Movement of a frame by one prior width [sigma] above which it is trusted less; ordinary shots stay below."""
 
-SETTLING = 4
-"""Steps with central differences at the end."""
-_SHARES = (1.0, 0.5, 0.2)
-"""Parts of such a step, the longest that does no harm."""
-ROUGH = 2.0
-"""What such a step may cost [log likelihood]: less is the simulator's roughness."""
+SETTLING = 8
+"""Most steps of the end."""
+FINE = 0.03
+"""Length of these differences, as a share of those that move the residual by one sigma."""
+SETTLED = 0.3
+"""Fall of the cost [log likelihood] by a step that is the last one."""
+_DAMPING = (1e-9, 1e-3, 1e-2, 1e-1, 1.0, 1e1)
+"""Damping factors that are tried at once at the end."""
 
 SMALL = 0.3
 """Size of the changes that show the simulator's roughness, in steps of the differences: curvature must not count."""
@@ -64,12 +68,16 @@ Watch = Callable[[str, float, Point], bool]
 class Influence:
     """How parameters move all recordings together."""
 
+    point: Point
+    """Where that was asked."""
     strength: Floats
     """(P,) by one prior width [sigma]."""
     steps: Floats
     """(P,) for differences, in prior widths."""
     gram: Floats
     """(P, P) products of the changes; `strength` is the root of its diagonal."""
+    changes: Floats
+    """(E, F, C, P) of the observations by one prior width [m or rad]; 0 where nothing was measured."""
 
     def felt(self, least: float, share: float) -> Ints:
         """Parameters that move the recordings by more than `least` sigma.
@@ -104,22 +112,15 @@ class Refined:
 def refine(likelihood: Likelihood, values: Floats, watch: Watch = lambda *_: True) -> Refined:
     """Fit from the given (P,) values."""
     point = start(likelihood, values)
-    first = sensitivity(some(likelihood), start(some(likelihood), values))
-    strong, steps = first.felt(STRONG, STRONG_SHARE), first.steps.copy()
+    few = some(likelihood)
+    first, share_asked = sensitivity(few, start(few, values)), len(few.inputs) / len(likelihood.inputs)
+    strong, steps = first.felt(STRONG * np.sqrt(share_asked), STRONG_SHARE), first.steps.copy()
     for i, share in enumerate(HORIZONS):
         part = likelihood.until(share * float(likelihood.time_s.max()))
         robust = max(ROBUST, 3.0 * typical_residual(part, point))
         last = share == HORIZONS[-1]
-        fit = minimise(
-            part,
-            point,
-            strong,
-            8 if last else 4,
-            robust,
-            tolerance=1.0 if last else 5.0,
-            steps=steps[strong],
-            fresh=last,
-        )
+        tolerance = 1.0 if last else 5.0
+        fit = minimise(part, point, strong, 4, robust, tolerance, steps=steps[strong], fresh=last)
         point, steps[strong] = fit.point, difference_steps(fit.linear)
         if not watch("refine", 0.7 * (i + 1) / len(HORIZONS), point):
             return polish(likelihood, point, watch)
@@ -134,11 +135,11 @@ def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True)
     influence = sensitivity(likelihood, point)
     felt = influence.felt(FELT, FELT_SHARE)
     robust = max(ROBUST, 3.0 * typical_residual(likelihood, point))
-    fit = minimise(likelihood, point, felt, 12, robust, tolerance=1.0, steps=influence.steps[felt])
+    fit = minimise(likelihood, point, felt, 3, robust, tolerance=3.0, steps=influence.steps[felt], fresh=False)
     watch("refine", 0.85, fit.point)
     rough = with_roughness(likelihood, fit)
     linear = scaled(fit.linear, likelihood, rough)
-    fit = settled(rough, minimise(rough, fit.point, felt, 8, ROBUST, tolerance=0.3, linear=linear, fresh=False))
+    fit = settled(rough, replace(fit, linear=linear, robust=ROBUST))
     watch("refine", 1.0, fit.point)
     spread = covariance(rough, fit)
     if many(likelihood):
@@ -149,30 +150,35 @@ def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True)
 
 
 def some(likelihood: Likelihood) -> Likelihood:
-    """Of hundreds of parameters the strongest are asked of every third recording: enough to begin with."""
-    episodes = len(likelihood.inputs)
-    return likelihood.of(np.arange(0, episodes, 3)) if many(likelihood) and episodes >= 2 * 3 else likelihood
+    """Which parameters are the strongest is asked of every second recording, or third: enough to begin with."""
+    episodes, every = len(likelihood.inputs), 3 if many(likelihood) else 2
+    return likelihood.of(np.arange(0, episodes, every)) if episodes >= 2 * every else likelihood
 
 
 def settled(likelihood: Likelihood, fit: Fit) -> Fit:
-    """The last steps to the optimum: plain Gauss-Newton with central differences.
+    """The last steps to the optimum: Gauss-Newton with short central differences.
 
-    Along a valley that coupled parameters share, one-sided differences lead astray by more than the error bars, and the
-    cost, rough by some units of log likelihood, says nothing of it. A step may therefore cost up to ROUGH.
+    Along a valley that coupled parameters share, their effects cancel to a hundredth. Differences that are wrong by
+    some per cent, as those of `minimise` are, end there, tens of log likelihood above the optimum.
     """
-    linear = fit.linear
+    free, robust, linear = fit.free, fit.robust, fit.linear
+    point = replace(fit.point, cost=float(cost(likelihood, [fit.point], robust)[0][0]))
     for _ in range(SETTLING):
-        steps = difference_steps(linear)
-        linear = central(likelihood, fit.point, fit.free, steps)
-        hessian, gradient = normal_equations(likelihood, fit.point, linear, fit.free, fit.robust)
-        move = -np.linalg.solve(hessian, gradient)
-        there = [moved(likelihood, fit.point, fit.free, share * move) for share in _SHARES]
-        costs, _ = cost(likelihood, [fit.point, *there], fit.robust)
-        best = next((i for i, reached in enumerate(costs[1:]) if reached < costs[0] + ROUGH), None)
-        if best is None:
+        linear = central(likelihood, point, free, FINE * difference_steps(linear))
+        hessian, gradient = normal_equations(likelihood, point, linear, free, robust)
+        trials = [damped_step(likelihood, point, free, hessian, gradient, damping) for damping in _DAMPING]
+        move = move_between(likelihood, point, trials[0], free)
+        promised = -float(gradient @ move + 0.5 * move @ hessian @ move)
+        costs, residuals = cost(likelihood, trials, robust)
+        best = int(np.argmin(costs))
+        gained = point.cost - float(costs[best])
+        if gained <= 0:
             break
-        fit = replace(fit, point=replace(there[best], cost=float(costs[1 + best])))
-    return replace(fit, linear=replace(linear, residual=residual_at(likelihood, fit.point)))
+        point = replace(trials[best], cost=float(costs[best]))
+        linear = replace(linear, residual=residuals[best])
+        if min(promised, gained) < SETTLED:
+            break
+    return replace(fit, point=point, linear=linear)
 
 
 def covariance(likelihood: Likelihood, fit: Fit) -> Floats:
@@ -196,12 +202,7 @@ def information_share(likelihood: Likelihood, fit: Fit) -> float:
 def residual_correlation_time(likelihood: Likelihood, fit: Fit) -> float:
     """Frames that one independent residual is worth, from the correlation of neighbours as in an AR(1) process."""
     residual = np.clip(residual_at(likelihood, fit.point), -fit.robust, fit.robust)
-    seen = ~np.isnan(likelihood.measured)
-    both = seen[:, 1:] & seen[:, :-1]
-    product = float(np.sum(np.where(both, residual[:, 1:] * residual[:, :-1], 0.0))) / max(int(both.sum()), 1)
-    square = float(np.mean(residual[seen] ** 2)) if seen.any() else 1.0
-    correlation = float(np.clip(product / max(square, 1e-12), 0.0, 0.97))
-    return (1 + correlation) / (1 - correlation)
+    return correlation_time(neighbour_correlation(residual, ~np.isnan(likelihood.measured)))
 
 
 def calmed(likelihood: Likelihood, linear: Linear) -> Likelihood:
@@ -210,8 +211,8 @@ def calmed(likelihood: Likelihood, linear: Linear) -> Likelihood:
     After an unlucky collision everything is amplified: the fit's errors, numerics, and physics that nobody asked about.
     Such frames say little about the parameters that other frames do not say better.
     """
-    moved = np.sqrt(np.sum(linear.jacobian**2, axis=-1)).max(axis=-1)  # (E, F)
-    amplified = np.maximum.accumulate(moved, axis=1) / CALM
+    movement = np.sqrt(np.sum(linear.jacobian**2, axis=-1)).max(axis=-1)  # (E, F)
+    amplified = np.maximum.accumulate(movement, axis=1) / CALM
     return replace(likelihood, sigma=likelihood.sigma * np.maximum(1.0, amplified)[:, :, None])
 
 
@@ -227,12 +228,14 @@ def sensitivity(likelihood: Likelihood, point: Point) -> Influence:
     """Influence of every parameter at a point, from one coarse difference each."""
     count = len(likelihood.parameters)
     strength, steps, gram = np.zeros(count), np.ones(count), np.zeros((count, count))
+    changes = np.zeros((*likelihood.measured.shape, count))
     asked = np.flatnonzero(acting(likelihood, point, COARSE))
     coarse = linearise(likelihood, point, asked, np.full(len(asked), COARSE))
     strength[asked], steps[asked] = np.sqrt(np.sum(coarse.jacobian**2, axis=(0, 1, 2))), difference_steps(coarse)
     columns = coarse.jacobian.reshape(-1, len(asked))
     gram[np.ix_(asked, asked)] = columns.T @ columns
-    return Influence(strength, steps, gram)
+    changes[..., asked] = coarse.jacobian * likelihood.sigma[..., None]
+    return Influence(point, strength, steps, gram, changes)
 
 
 def typical_residual(likelihood: Likelihood, point: Point) -> float:

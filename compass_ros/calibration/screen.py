@@ -15,7 +15,7 @@ from itertools import groupby
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Point
+from compass_ros.calibration.least_squares import Point, inward
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.types import Bools, Floats, Ints
 
@@ -54,8 +54,8 @@ def acting(likelihood: Likelihood, point: Point, share: float) -> Bools:
 
 def moved_by(likelihood: Likelihood, point: Point, share: float) -> Floats:
     """(P,) steps of `share` prior widths, to the side that stays inside the bounds."""
-    steps = share * likelihood.prior_std
-    return np.where(point.values + steps > likelihood.high, -steps, steps)
+    everything = np.arange(len(likelihood.parameters))
+    return inward(likelihood, point, everything, np.full(len(everything), share))
 
 
 def alike(names: list[str]) -> list[Ints]:

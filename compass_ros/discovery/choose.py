@@ -7,7 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, Point, cost, difference_steps, linearise, minimise
+from compass_ros.calibration.least_squares import (
+    Fit,
+    Point,
+    cost,
+    difference_steps,
+    linearise,
+    minimise,
+    robust_loss,
+    robust_weight,
+)
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import ROBUST, calmed, covariance
 from compass_ros.discovery.candidates import Candidate
@@ -108,7 +117,7 @@ def surprise(unseen: Likelihood, fitted: Likelihood, fit: Fit) -> float:
     A model that is unsure what its parameters are may be wrong about an episode without being refuted by it: the
     residual has the covariance 1 + J C J', C that of the fitted parameters. Outliers are weighed down as in the fit.
     """
-    judged = replace(fitted, inputs=unseen.inputs, time_s=unseen.time_s, measured=unseen.measured, sigma=unseen.sigma)
+    judged = fitted.on(unseen)
     point = Point(fit.point.values, np.zeros_like(unseen.inputs), np.inf)
     linear = linearise(judged, point, fit.free, difference_steps(fit.linear))
     residual, jacobian = linear.residual.ravel(), linear.jacobian.reshape(-1, len(fit.free))
@@ -116,11 +125,11 @@ def surprise(unseen: Likelihood, fitted: Likelihood, fit: Fit) -> float:
     precision = np.linalg.inv(known)
     left, weight = residual, np.ones_like(residual)
     for _ in range(3):
-        weight = 1 / np.sqrt(1 + (left / ROBUST) ** 2)
+        weight = robust_weight(left, ROBUST)
         inner = precision + (jacobian * weight[:, None]).T @ jacobian
         move = -np.linalg.solve(inner, jacobian.T @ (weight * residual))
         left = residual + jacobian @ move
-    loss = float(np.sum(left**2 / (np.sqrt(1 + (left / ROBUST) ** 2) + 1)))
+    loss = 0.5 * float(np.sum(robust_loss(left, ROBUST)))
     volume = np.linalg.slogdet(inner)[1] - np.linalg.slogdet(precision)[1]
     return loss + 0.5 * float(move @ precision @ move) + 0.5 * float(volume)
 
@@ -129,7 +138,7 @@ def noise_cost(likelihood: Likelihood, fit: Fit) -> float:
     """Cost that unit normal noise leaves under the robust loss, less what the free parameters take."""
     grid = np.linspace(-6, 6, 2001)
     density = np.exp(-0.5 * grid**2) / np.sqrt(2 * np.pi)
-    loss = fit.robust**2 * (np.sqrt(1 + (grid / fit.robust) ** 2) - 1)
+    loss = 0.5 * robust_loss(grid, fit.robust)
     noise = likelihood.sigma.min(axis=(0, 1))  # before any collision there is nothing but the tracker's noise
     quiet = noise**2 / likelihood.sigma**2  # where sigma holds more than noise, noise is quieter than one sigma
     of_noise = float(np.sum(density * loss) * (grid[1] - grid[0]))

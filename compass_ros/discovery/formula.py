@@ -209,7 +209,7 @@ def propose(space: Space, held_out: Likelihood, iterations: int = 12) -> Proposa
     best, proposal = 0.0, None
     for formula in max(by_objects, key=lambda formulas: formulas[-1].gain - 5.0 * len(formulas)):
         joint = fit_jointly(space, [formula.score], iterations)
-        gain = 1 - _excess(_with(held_out, joint), joint.fit.point.values) / before
+        gain = 1 - _excess(joint.likelihood.on(held_out), joint.fit.point.values) / before
         if gain < best + KEPT:
             break
         best, proposal = gain, _proposal(formula, joint, gain)
@@ -221,15 +221,6 @@ def _proposal(formula: Formula, joint: Joint, gain: float) -> Proposal:
     objects = " and ".join(formula.score.candidate.attached.objects)
     sentence = f"A formula is proposed for {objects}, not named: {fitted.text} (SI; held-out excess -{gain:.0%})."
     return Proposal(fitted, joint, gain, sentence)
-
-
-def _with(held_out: Likelihood, joint: Joint) -> Likelihood:
-    """The held-out episodes as the wider simulator predicts them."""
-    fitted = joint.likelihood
-    return Likelihood(
-        fitted.predict, fitted.parameters, held_out.inputs, held_out.time_s, held_out.measured, held_out.sigma,
-        held_out.correlation_time, held_out.launch_std, fitted.prior_mean, fitted.prior_std,
-    )  # fmt: skip
 
 
 def _excess(likelihood: Likelihood, values: Floats) -> float:

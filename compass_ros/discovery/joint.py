@@ -7,7 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, Linear, Point, cost, minimise, normal_equations
+from compass_ros.calibration.least_squares import (
+    FIRST_STEP,
+    Fit,
+    Linear,
+    Point,
+    cost,
+    inward,
+    minimise,
+    normal_equations,
+)
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.simulation import Simulator
@@ -106,8 +115,7 @@ def _extended(space: Space, likelihood: Likelihood, point: Point, residual: Floa
     old = space.fit.linear
     new = free[old.jacobian.shape[-1] :]
     episodes = len(likelihood.inputs)
-    steps = np.clip(0.02 * likelihood.prior_std[new], 1e-9, None)
-    steps = np.where(point.values[new] + steps > likelihood.high[new], -steps, steps)
+    steps = inward(likelihood, point, new, np.full(len(new), FIRST_STEP))
     values = np.tile(point.values, (len(new), 1))
     values[np.arange(len(new)), new] += steps
     index = np.tile(np.arange(episodes), len(new))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compass_ros.calibration.noise import Noise
+from compass_ros.calibration.noise import Noise, correlated
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.types import Floats
 
@@ -48,18 +48,8 @@ def simulate_null(space: Space, scores: Sequence[Score], noise: Noise, seed: int
     gains = np.zeros(DRAWS)
     for i in range(DRAWS):
         white = rng.standard_normal((episodes, frames, columns))
-        draw = _correlated(white, noise.correlation)
+        draw = correlated(white, noise.correlation)
         pull = unit.T @ (np.where(measured, draw, 0.0).reshape(episodes, -1) * space.weight).ravel()
         extra = rng.chisquare(np.maximum(free[keep] - 1, 0) + 1e-9)
         gains[i] = float(np.max(0.5 * (pull**2 / noise.correlation_time + extra), initial=0.0))
     return Null(gains)
-
-
-def _correlated(white: Floats, correlation: float) -> Floats:
-    """(E, F, C) AR(1) noise of unit variance along the frames."""
-    if correlation < 0.02:
-        return white
-    out = white.copy()
-    for frame in range(1, white.shape[1]):
-        out[:, frame] = correlation * out[:, frame - 1] + np.sqrt(1 - correlation**2) * white[:, frame]
-    return out

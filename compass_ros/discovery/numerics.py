@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, normal_equations
+from compass_ros.calibration.least_squares import Fit, normal_equations, robust_weight
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.joint import Joint
 from compass_ros.discovery.screen import Space
@@ -38,7 +38,7 @@ def shift(joint: Joint) -> Floats:
     """
     simulator, likelihood, fit = joint.simulator, joint.likelihood, joint.fit
     moved = _moved(simulator, likelihood, fit, {"timestep": 0.5 * simulator.options.timestep})
-    weight = (1 + (fit.linear.residual / fit.robust) ** 2) ** -0.5
+    weight = robust_weight(fit.linear.residual, fit.robust)
     jacobian = fit.linear.jacobian
     hessian, _ = normal_equations(likelihood, fit.point, fit.linear, fit.free, fit.robust)
     pull = np.einsum("efcp,efc->p", jacobian, weight * moved)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Point
+from compass_ros.calibration.least_squares import Point, robust_weight
 from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.noise import correlation_of
 from compass_ros.calibration.refine import residual_at
 
 _LAGS = (1, 2, 3, 4)
@@ -20,9 +21,9 @@ def smooth_excess(likelihood: Likelihood, point: Point, robust: float) -> float:
     1 / sqrt(4 N), where the residual's mean square is known no better than the noise.
     """
     residual = residual_at(likelihood, point)
-    residual = residual * (1 + (residual / robust) ** 2) ** -0.25  # as the robust loss counts it
+    residual = residual * np.sqrt(robust_weight(residual, robust))  # as the robust loss counts it
     seen = ~np.isnan(likelihood.measured)
-    correlation = (likelihood.correlation_time - 1) / (likelihood.correlation_time + 1)
+    correlation = correlation_of(likelihood.correlation_time)
     found = []
     for lag in _LAGS:
         both = seen[:, lag:] & seen[:, :-lag]

@@ -14,11 +14,12 @@ from itertools import product
 import numpy as np
 from scipy.optimize import minimize
 
-from compass_ros.calibration.least_squares import Fit
+from compass_ros.calibration.least_squares import Fit, robust_weight
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.impulses import Impulses
 from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import Quantity
 from compass_ros.types import Floats
 
 
@@ -44,7 +45,7 @@ class Space:
         self.fit = fit
         self.pushes = pushes
         episodes = len(likelihood.inputs)
-        weight = (1 + (fit.linear.residual / fit.robust) ** 2) ** -0.25
+        weight = np.sqrt(robust_weight(fit.linear.residual, fit.robust))
         self.weight = weight.reshape(episodes, -1)
         base = fit.linear.jacobian.reshape(episodes, self.weight.shape[1], -1) * self.weight[:, :, None]
         own = fit.linear.launch_jacobian.reshape(episodes, self.weight.shape[1], -1) * self.weight[:, :, None]
@@ -134,7 +135,7 @@ def score_force(space: Space, candidate: Candidate) -> Score:
     quantities = candidate.attached.effect.quantities
     shape_of = [i for i, q in enumerate(quantities) if not q.amplitude]
     best: list[tuple[float, Floats]] = []
-    for point in product(*(_grid(quantities[i].name, quantities[i].low, quantities[i].high) for i in shape_of)):
+    for point in product(*(shape_grid(quantities[i]) for i in shape_of)):
         shapes = np.zeros(len(quantities))
         shapes[shape_of] = point
         _, gain = _at(space, candidate, shapes)
@@ -193,8 +194,9 @@ def _at(space: Space, candidate: Candidate, shapes: Floats) -> tuple[Floats, flo
     return best
 
 
-def _grid(name: str, low: float, high: float) -> Floats:
+def shape_grid(shape: Quantity) -> Floats:
     """Where the search for a shape begins: places evenly, sizes and rates in equal ratios."""
+    low, high = shape.low, shape.high
     if low < 0 < high:
         return np.linspace(0.85 * low, 0.85 * high, 9 if high - low > 0.6 else 5)
-    return np.geomspace(max(low, 0.02 * high), 0.8 * high, 12 if name == "frequency" else 4)
+    return np.geomspace(max(low, 0.02 * high), 0.8 * high, 12 if shape.name == "frequency" else 4)

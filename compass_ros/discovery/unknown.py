@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 import numpy as np
 
 from compass_ros.discovery.choose import Choice
 from compass_ros.discovery.screen import Space
-from compass_ros.types import Floats, Region, Where
+from compass_ros.types import Channel, Floats, Phase, Region, Where
 
 _SIZES = (1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 """Prior sizes of a flexible push that are tried [m/s^2]."""
@@ -14,6 +17,18 @@ _LENGTH = 0.12
 """Distance over which a flexible push is alike [m]."""
 _HALF = 0.6
 """Share of the pushes' strength that a region must hold to be told as the place."""
+_PHASE: Mapping[Channel, Phase] = {"actuation": "strike", "contact": "object_contact", "sensing": "all"}
+"""Where an effect of each channel but `dynamics` shows."""
+
+
+@dataclass(frozen=True)
+class _Push:
+    """A flexible push at its best prior size."""
+
+    gain: float
+    """Log evidence over no push."""
+    mean: Floats
+    """(E, K, N, 2) [m/s^2]"""
 
 
 def whereabouts(space: Space, choice: Choice) -> tuple[Where, bool]:
@@ -24,17 +39,16 @@ def whereabouts(space: Space, choice: Choice) -> tuple[Where, bool]:
     """
     movers = space.pushes.movers
     sets = [movers] if len(movers) < 2 else [movers, *((m,) for m in movers)]
-    gains = {objects: _flexible(space, objects) for objects in sets}
-    best = max(gains, key=lambda objects: gains[objects] * (1.02 if len(objects) == 1 else 1.0))
+    pushes = {objects: _push(space, objects) for objects in sets}
+    best = max(pushes, key=lambda objects: pushes[objects].gain * (1.02 if len(objects) == 1 else 1.0))
     others = {j.added[0].effect.channel: j for j in reversed(choice.singles) if j.added[0].effect.channel != "dynamics"}
     rival = min(others.values(), key=lambda j: j.fit.point.cost, default=None)
     explained = choice.floor + choice.excess - rival.fit.point.cost if rival else 0.0
-    if rival is not None and explained > 1.2 * gains[best]:
+    if rival is not None and explained > 1.2 * pushes[best].gain:
         channel = rival.added[0].effect.channel
-        phase = {"actuation": "strike", "contact": "object_contact", "sensing": "all"}[channel]
-        return Where("all", phase, channel), True  # type: ignore[arg-type]
+        return Where("all", _PHASE[channel], channel), True
     name = best[0] if len(best) == 1 and len(movers) > 1 else "all"
-    return Where(name, "free", "dynamics", _region(space, best)), gains[best] > 10.0
+    return Where(name, "free", "dynamics", _region(space, pushes[best])), pushes[best].gain > 10.0
 
 
 def _kernel(space: Space, objects: tuple[str, ...]) -> Floats:
@@ -50,11 +64,11 @@ def _kernel(space: Space, objects: tuple[str, ...]) -> Floats:
     return np.asarray((field + pulse) * on[:, None] * on[None])
 
 
-def _pushes(space: Space, objects: tuple[str, ...], size: float) -> tuple[float, Floats]:
-    """Gain of a flexible push of a prior size, and its (E, K, N, 2) mean."""
+def _push(space: Space, objects: tuple[str, ...]) -> _Push:
+    """The flexible push of the prior size that explains most."""
     shape = space.pushes.paths.shape[:3]
-    kernel = size**2 * _kernel(space, objects) + 1e-12 * np.eye(int(np.prod(shape)))
-    root = np.linalg.cholesky(kernel + 1e-9 * size**2 * np.eye(len(kernel)))
+    kernel = _kernel(space, objects)
+    root = np.linalg.cholesky(kernel + 1e-6 * np.eye(len(kernel)))
     keep = min(120, len(root))
     vectors, values, _ = np.linalg.svd(root, full_matrices=False)
     basis = (vectors[:, :keep] * values[:keep]).reshape(*shape, keep)
@@ -64,21 +78,19 @@ def _pushes(space: Space, objects: tuple[str, ...], size: float) -> tuple[float,
     weights = both.reshape(shape[0], -1, 2 * keep)
     matrix, pull = space.reduced(weights)
     kappa = space.likelihood.correlation_time
-    inner = matrix / kappa + np.eye(len(pull))
-    mean = -np.linalg.solve(inner, pull / kappa)
-    gain = -0.5 * float(pull @ mean) - 0.5 * kappa * float(np.linalg.slogdet(inner)[1])
-    return gain, np.asarray((weights @ mean).reshape(*shape, 2))
+    best = _Push(-np.inf, np.zeros((*shape, 2)))
+    for size in _SIZES:
+        inner = size**2 * matrix / kappa + np.eye(len(pull))
+        mean = -np.linalg.solve(inner, size * pull / kappa)
+        gain = -0.5 * size * float(pull @ mean) - 0.5 * kappa * float(np.linalg.slogdet(inner)[1])
+        if gain > best.gain:
+            best = _Push(gain, np.asarray((weights @ (size * mean)).reshape(*shape, 2)))
+    return best
 
 
-def _flexible(space: Space, objects: tuple[str, ...]) -> float:
-    return max(_pushes(space, objects, size)[0] for size in _SIZES)
-
-
-def _region(space: Space, objects: tuple[str, ...]) -> Region | None:
+def _region(space: Space, push: _Push) -> Region | None:
     """A disc that holds most of the push's strength, where it is clearly smaller than the table."""
-    size = max(_SIZES, key=lambda s: _pushes(space, objects, s)[0])
-    push = _pushes(space, objects, size)[1]
-    strength = np.sum(push**2, axis=3).ravel()
+    strength = np.sum(push.mean**2, axis=3).ravel()
     place = space.pushes.paths[..., :2].reshape(-1, 2)
     if strength.sum() <= 0:
         return None

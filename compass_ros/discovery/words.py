@@ -54,7 +54,8 @@ def place(where: Where) -> str:
 def value_of(finding: EffectFinding) -> str:
     """The effect and its first number: 'fan_field, strength 0.21 +- 0.01 m/s^2'."""
     name, first = next(iter(finding.parameters.items()))
-    return f"{finding.name}, {name} {first.value:.3g} +- {first.std:.1g} {first.unit}".replace(" 1", "", 0).rstrip()
+    unit = "" if first.unit == "1" else f" {first.unit}"
+    return f"{finding.name}, {name} {first.value:.3g} +- {first.std:.1g}{unit}"
 
 
 def errors(before: float, after: float, floor: float) -> str:

@@ -9,9 +9,10 @@ import numpy as np
 
 from compass_ros.calibration.least_squares import Point, minimise, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.noise import correlation_time, neighbour_correlation
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import Recordings, recordings
-from compass_ros.types import Bools, Episode, Floats
+from compass_ros.types import Episode, Floats
 
 ROBUST = 1e3
 """Scale of the loss [sigma]: these recordings have no outliers, squares are meant."""
@@ -99,7 +100,7 @@ def fit(
     residual = found.linear.residual * likelihood.sigma
     seen = ~np.isnan(likelihood.measured) & (np.ptp(np.nan_to_num(likelihood.measured), axis=(0, 1)) > 0)
     square = float(np.mean(residual[seen] ** 2))
-    worth = correlation_time(residual, seen)
+    worth = correlation_time(neighbour_correlation(residual, seen))
     scale = square / simulator.cell.spec.noise_m**2 * worth
     hessian, _ = normal_equations(likelihood, found.point, found.linear, free, ROBUST)
     data_part = hessian - np.eye(len(hessian))
@@ -145,15 +146,6 @@ def with_free_start(simulator: Simulator, values: Floats, episodes: Sequence[Epi
     """The first state of each recording fitted to it, and nothing else."""
     fixed = dict(zip((p.name for p in simulator.parameters), values.tolist(), strict=True))
     return fit(simulator, episodes, (), True, fixed)
-
-
-def correlation_time(residual: Floats, seen: Bools) -> float:
-    """Frames that one independent residual is worth, as an AR(1) process of (E, F, C) residuals."""
-    both = seen[:, 1:] & seen[:, :-1]
-    product = np.sum(np.where(both, residual[:, 1:] * residual[:, :-1], 0.0))
-    square = np.sum(np.where(both, residual[:, 1:] ** 2 + residual[:, :-1] ** 2, 0.0)) / 2
-    correlation = float(np.clip(product / max(square, 1e-300), 0.0, 0.98))
-    return (1 + correlation) / (1 - correlation)
 
 
 def thinned(episode: Episode, every: int) -> Episode:

@@ -12,6 +12,7 @@ from itertools import product
 
 import numpy as np
 
+from compass_ros.discovery.screen import shape_grid
 from compass_ros.rivals.accelerations import Samples
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, Effect
@@ -90,14 +91,7 @@ def best_block(
 
 def _shapes(effect: Effect) -> Floats:
     """(S, q) a grid over the quantities that are no amplitudes."""
-    axes: list[Floats] = []
-    for q in effect.quantities:
-        if q.amplitude:
-            axes.append(np.zeros(1))
-        elif q.low < 0 < q.high:
-            axes.append(np.linspace(0.85 * q.low, 0.85 * q.high, 9 if q.high - q.low > 0.6 else 5))
-        else:
-            axes.append(np.geomspace(max(q.low, 0.02 * q.high), 0.8 * q.high, 12 if q.name == "frequency" else 4))
+    axes = [np.zeros(1) if q.amplitude else shape_grid(q) for q in effect.quantities]
     return np.array(list(product(*axes)))
 
 

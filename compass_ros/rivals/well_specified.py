@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from compass_ros.calibration.noise import Noise
+from compass_ros.calibration.noise import Noise, correlated
 from compass_ros.rivals.calibrated import Calibrated, Shots
 from compass_ros.types import Floats
 
@@ -39,11 +39,7 @@ def _again(given: Calibrated, shots: Shots, values: Floats, rng: np.random.Gener
 
 def _noise(noise: Noise, shape: tuple[int, ...], rng: np.random.Generator) -> Floats:
     """(E, F, C) AR(1) noise of the measured size and correlation [m]."""
-    fresh = rng.standard_normal(shape)
-    keep = noise.correlation
-    for k in range(1, shape[1]):
-        fresh[:, k] = keep * fresh[:, k - 1] + np.sqrt(1 - keep**2) * fresh[:, k]
-    return np.asarray(fresh * noise.sigma)
+    return correlated(rng.standard_normal(shape), noise.correlation) * noise.sigma
 
 
 def _features(residual: Floats, noise: Noise) -> Floats:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from compass_ros.calibration.noise import correlation_time, neighbour_correlation
 from compass_ros.cells import load
-from compass_ros.real.fitting import Unknown, correlation_time, fit, gain, residual_at, thinned, with_free_start
+from compass_ros.real.fitting import Unknown, fit, gain, residual_at, thinned, with_free_start
 from compass_ros.real.pendulums import drag, dry
 from compass_ros.simulation import Simulator
 from compass_ros.types import Episode, Track
@@ -68,8 +69,8 @@ def test_frames_that_one_independent_one_is_worth() -> None:
     for t in range(1, 2000):
         slow[:, t] = 0.8 * slow[:, t - 1] + white[:, t]
     seen = np.ones(white.shape, bool)
-    assert correlation_time(white, seen) == pytest.approx(1.0, abs=0.1)
-    assert correlation_time(slow, seen) == pytest.approx(9.0, rel=0.15)
+    assert correlation_time(neighbour_correlation(white, seen)) == pytest.approx(1.0, abs=0.1)
+    assert correlation_time(neighbour_correlation(slow, seen)) == pytest.approx(9.0, rel=0.15)
 
 
 def test_thinned() -> None:

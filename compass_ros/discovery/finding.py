@@ -1,0 +1,257 @@
+"""What is said when the verdict is due: named, ambiguous, unknown, nothing or failed, with its evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.noise import Noise
+from compass_ros.calibration.refine import Refined, covariance, settled
+from compass_ros.discovery.choose import NEEDED, Choice, HeldOut, evidence
+from compass_ros.discovery.formula import Proposal, propose
+from compass_ros.discovery.joint import Joint
+from compass_ros.discovery.maps import TableMap, residual_map
+from compass_ros.discovery.next_shot import next_experiment
+from compass_ros.discovery.null import Null
+from compass_ros.discovery.numerics import shift
+from compass_ros.discovery.screen import Score, Space
+from compass_ros.discovery.unknown import whereabouts
+from compass_ros.discovery.words import errors, place, value_of, where_of
+from compass_ros.simulation import Simulator
+from compass_ros.types import EffectFinding, EffectParameter, Evidence, Floats, Mismatch, Verdict
+
+EQUAL = 3.0
+"""Log evidence within which two effects are told apart by nothing."""
+EQUAL_SHARE = 0.015
+"""The same as a share of the excess: functional forms are never exactly right."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """One candidate for the report's ranking."""
+
+    name: str
+    channel: str
+    log_evidence: float
+    held_out_gain: float
+    kept: bool
+    note: str
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """The verdict, and the simulator with the effects inside where some were found."""
+
+    mismatch: Mismatch
+    simulator: Simulator | None = None
+    values: Floats | None = None
+    """(P + Q,) parameters and effects of that simulator."""
+    parameters: Floats | None = None
+    """(P,) the parameters, fitted together with the effects."""
+    std: Floats | None = None
+    """(P,) one standard deviation of the parameters."""
+    effect_std: Floats | None = None
+    """(P + Q,) one standard deviation of `values`."""
+    tried: tuple[Tried, ...] = ()
+    before: TableMap | None = None
+    after: TableMap | None = None
+    warnings: Sequence[str] = ()
+
+
+def not_evaluated(reason: str) -> Discovery:
+    """No verdict, said plainly."""
+    return Discovery(Mismatch("not_evaluated", None, (), (), "", f"Missing physics was not looked for: {reason}."))
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What is known when the verdict is due."""
+
+    simulator: Simulator
+    space: Space
+    refined: Refined
+    judge: Likelihood
+    noise: Noise
+    null: Null
+    undetectable: tuple[str, ...]
+    before: TableMap | None
+    seed: int
+    warnings: tuple[str, ...]
+
+    def none(self, scores: Sequence[Score]) -> Discovery:
+        """The noise explains everything."""
+        seen = self._held_out(self.simulator, self.refined.fit.point.values)
+        sentence = (
+            f"Nothing is missing that these recordings could show: held-out error {1e3 * seen:.2f} mm, "
+            f"noise {1e3 * self._floor():.2f} mm."
+        )
+        tried = tuple(
+            Tried(s.candidate.name, s.candidate.attached.effect.channel, s.gain, 0.0, False, "within the noise")
+            for s in scores[:8]
+        )
+        mismatch = Mismatch("none", None, (), self.undetectable, "", sentence)
+        return Discovery(mismatch, tried=tried, before=self.before, warnings=self.warnings)
+
+    def failed(self, sentence: str) -> Discovery:
+        """Something is left, and it is no evidence of physics."""
+        mismatch = Mismatch("fit_failed", None, (), self.undetectable, "", sentence)
+        return Discovery(mismatch, before=self.before, warnings=self.warnings)
+
+    def judged(self, choice: Choice, unseen: HeldOut) -> Discovery:
+        """Named, ambiguous, unknown or failed."""
+        best = choice.singles[0] if choice.singles else None
+        if choice.two and choice.pair is not None:
+            return self.named(choice.pair, choice, ((), ()))
+        if best is not None and choice.enough(best) and unseen.helps(best):
+            return self.named(best, choice, (self._equals(best, choice, unseen),))
+        pair = choice.pair
+        both = pair is not None and best is not None and choice.share(pair) - choice.share(best) > NEEDED
+        if pair is not None and both and choice.enough(pair) and unseen.helps(pair):
+            return self.named(pair, choice, ((), ()))
+        return self.unknown(choice)
+
+    def named(self, joint: Joint, choice: Choice, equal: tuple[tuple[Joint, ...], ...]) -> Discovery:
+        """One or two effects with values, errors and evidence."""
+        joint = replace(joint, fit=settled(joint.likelihood, joint.fit))
+        std = self._std(joint)
+        movers = self.simulator.movers()
+        findings, at = [], len(self.simulator.cell.parameters)
+        for attached, equals in zip(joint.added, equal, strict=True):
+            size = len(attached.effect.quantities)
+            numbers, errors_of = joint.fit.point.values[at : at + size], std[at : at + size]
+            parameters = {
+                q.name: EffectParameter(float(v), float(e), q.unit)
+                for q, v, e in zip(attached.effect.quantities, numbers, errors_of, strict=True)
+            }
+            names = tuple(dict.fromkeys(a.effect.name for other in equals for a in other.added))
+            findings.append(EffectFinding(attached.effect.name, parameters, self._evidence(joint, choice), names))
+            at += size
+        at = len(self.simulator.cell.parameters)
+        first = joint.fit.point.values[at : at + len(joint.added[0].effect.quantities)]
+        where = where_of(joint.added[0], first, movers)
+        rivals = [joint, *equal[0]]
+        ambiguous = len(rivals) > 1
+        following = next_experiment(self.simulator, self._plain(), rivals, self.seed).sentence if ambiguous else ""
+        lacks = " and ".join(a.effect.sentence for a in joint.added)
+        if ambiguous:
+            lacks = "one of these: " + "; ".join(a.effect.sentence for j in rivals for a in j.added)
+        values = "; ".join(value_of(f) for f in findings)
+        sentence = f"{place(where)}, the simulator lacks {lacks}; {values}; {self._errors(joint)}."
+        verdict: Verdict = "ambiguous" if ambiguous else "named"
+        mismatch = Mismatch(verdict, where, tuple(findings), self.undetectable, following, sentence)
+        return self._with(joint, mismatch, choice, std)
+
+    def unknown(self, choice: Choice) -> Discovery:
+        """Something is there that no known effect explains; a formula is proposed where one predicts."""
+        where, sure = whereabouts(self.space, choice)
+        if not sure and not choice.singles:
+            return self.failed("No verdict: the fit did not reach the noise floor and no place stands out.")
+        proposal: Proposal | None = propose(self.space, self.judge)
+        sentence = f"{place(where)}, something differs that no known effect explains"
+        if choice.singles:
+            best = choice.singles[0]
+            sentence += f" (the best, {best.name}, explains {100 * choice.share(best):.0f} % of it)"
+        sentence += f"; {proposal.sentence}" if proposal else "."
+        mismatch = Mismatch("unknown", where, (), self.undetectable, "", sentence)
+        if proposal is None:
+            return Discovery(mismatch, tried=self._tried(choice, None), before=self.before, warnings=self.warnings)
+        return self._with(proposal.joint, mismatch, choice, self._std(proposal.joint))
+
+    def _with(self, joint: Joint, mismatch: Mismatch, choice: Choice, std: Floats) -> Discovery:
+        cell = len(self.simulator.cell.parameters)
+        after = residual_map(self.space, joint.fit.linear.residual)
+        return Discovery(
+            mismatch,
+            joint.simulator,
+            joint.fit.point.values,
+            joint.fit.point.values[:cell],
+            std[:cell],
+            std,
+            self._tried(choice, joint),
+            self.before,
+            after,
+            self.warnings,
+        )
+
+    def _equals(self, best: Joint, choice: Choice, unseen: HeldOut) -> tuple[Joint, ...]:
+        """Other effects that explain the recordings as well: within EQUAL of log evidence, or EQUAL_SHARE."""
+        kappa = self.noise.correlation_time
+        top = evidence(best, unseen)
+        margin = max(EQUAL, EQUAL_SHARE * choice.excess / kappa)
+        seen, out = {best.name}, []
+        for joint in choice.singles[1:]:
+            contains = joint.added[0].effect.limit == best.name
+            if (
+                joint.name not in seen
+                and not contains
+                and top - evidence(joint, unseen) < margin
+                and unseen.helps(joint)
+            ):
+                out.append(joint)
+            seen.add(joint.name)
+        return tuple(out)
+
+    def _held_out(self, simulator: Simulator, values: Floats) -> float:
+        """rms distance on held-out episodes [m]."""
+        tiled = np.tile(values, (len(self.judge.inputs), 1))
+        missed = simulator.observe(tiled, self.judge.inputs, self.judge.time_s) - self.judge.measured
+        objects = max(len(self.simulator.cell.objects), 1)
+        return float(np.sqrt(np.nanmean(missed**2) * missed.shape[2] / objects))
+
+    def _floor(self) -> float:
+        objects = max(len(self.simulator.cell.objects), 1)
+        return float(np.sqrt(np.sum(self.noise.sigma**2) / objects))
+
+    def _errors(self, joint: Joint) -> str:
+        before = self._held_out(self.simulator, self.refined.fit.point.values)
+        return errors(before, self._held_out(joint.simulator, joint.fit.point.values), self._floor())
+
+    def _gain(self, joint: Joint) -> float:
+        before = self._held_out(self.simulator, self.refined.fit.point.values)
+        after, floor = self._held_out(joint.simulator, joint.fit.point.values), self._floor()
+        return float(np.clip((before - after) / max(before - floor, 1e-9), -1.0, 1.0))
+
+    def _evidence(self, joint: Joint, choice: Choice) -> Evidence:
+        kappa = self.noise.correlation_time
+        gained = choice.floor + choice.excess - joint.fit.point.cost
+        hessians = joint.log_evidence(kappa) + joint.fit.point.cost / kappa
+        plain = Joint(self.simulator, self.refined.likelihood, self.refined.fit, ())
+        without = plain.log_evidence(kappa) + self.refined.fit.point.cost / kappa
+        return Evidence(self._gain(joint), gained / kappa + hessians - without, self.null.false_alarm_p(gained / kappa))
+
+    def _std(self, joint: Joint) -> Floats:
+        """(P + Q,) standard deviations; the prior's where the recordings say nothing.
+
+        Those of effects hold what a finite time step does to them; the parameters are those of this simulator.
+        """
+        std = joint.likelihood.prior_std.copy()
+        free = joint.fit.free
+        of_effects = free >= len(self.simulator.cell.parameters)
+        variance = np.diag(covariance(joint.likelihood, joint.fit))[: len(free)]
+        std[free] *= np.sqrt(variance + np.where(of_effects, shift(joint), 0.0) ** 2)
+        return std
+
+    def _plain(self) -> Likelihood:
+        return self.refined.likelihood
+
+    def _tried(self, choice: Choice, chosen: Joint | None) -> tuple[Tried, ...]:
+        movers = self.simulator.movers()
+
+        def on(joint: Joint) -> str:
+            parts = {o for a in joint.added for o in a.objects}
+            return "" if not parts or parts >= set(movers) else f"on {' and '.join(sorted(parts))}: "
+
+        return tuple(
+            Tried(
+                joint.name,
+                joint.added[0].effect.channel,
+                self._evidence(joint, choice).log_evidence,
+                self._gain(joint),
+                chosen is not None and joint.added is chosen.added,
+                f"{on(joint)}explains {100 * choice.share(joint):.0f} % of the excess",
+            )
+            for joint in ((choice.pair,) if choice.pair else ()) + choice.singles
+        )
