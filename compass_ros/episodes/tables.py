@@ -123,7 +123,7 @@ def _config(path: Path) -> ImportConfig:
 
 def _roots(path: Path) -> list[Path]:
     named = os.environ.get(DATA_VARIABLE)
-    return [Path(named)] if named else [path.parent, _PROJECT.parent / "shared" / "data"]
+    return [*([Path(named)] if named else []), path.parent, _PROJECT.parent / "shared" / "data"]
 
 
 def _find(name: str, roots: Sequence[Path], path: Path) -> list[Path]:

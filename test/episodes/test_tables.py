@@ -181,6 +181,8 @@ def test_the_folder_comes_from_the_command_line_or_the_environment(
     assert len(import_tables(path, drops / "one", elsewhere)) == 2
     monkeypatch.setenv(DATA_VARIABLE, str(elsewhere))
     assert len(import_tables(path, drops / "other")) == 2
+    (elsewhere / "drops.csv").rename(drops / "drops.csv")
+    assert len(import_tables(path, drops / "beside")) == 2  # what the named folder lacks is beside the YAML
 
 
 @needs_real
