@@ -65,6 +65,7 @@ setup(
     install_requires=[
         "annotated-types",
         "cma",
+        "gymnasium",
         "jinja2",
         "jsonschema",
         "lz4",
@@ -84,6 +85,7 @@ setup(
         "sbi",
         "scikit-learn<1.8",  # pysindy 1.7 calls what 1.8 took away
         "scipy",
+        "stable-baselines3",
         "torch",
         "typer",
         "zstandard",

@@ -13,6 +13,7 @@ from compass_ros.commands import (
     demo,
     diagnose,
     plan,
+    policy,
     prove,
     real,
     record,
@@ -30,7 +31,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="What went wrong with my simulator? Calibrate it from recordings, and find the physics that it lacks.",
 )
-for module in (demo, plan, track, record, calibrate, diagnose, report):
+for module in (demo, plan, track, record, calibrate, diagnose, report, policy):
     module.add_to(app)
 for module in (conceal, unseal, prove, rivals, bench, real, tables):
     module.add_to(app)

@@ -36,6 +36,7 @@ HOMES = {
     ("mujoco", "robosuite"): {"simulation", "cells", "concealed"},
     ("torch",): {"calibration", "policy"},
     ("pysindy", "sklearn"): {"rivals"},
+    ("stable_baselines3", "gymnasium"): {"policy"},
     ("cv2",): {"tracking"},
     ("rosbags", "mcap", "mcap_ros2"): {"episodes"},
     ("rclpy", "launch", "launch_ros", "ament_index_python", "rcl_interfaces", "action_msgs"): {"nodes"},
@@ -57,6 +58,7 @@ NEIGHBOURS = {
     ("discovery", "cells"),
     ("discovery", "simulation"),
     ("discovery", "calibration"),
+    ("policy", "simulation"),
 }
 """Steps of one layer that know each other: what is simulated is a cell, and an effect is part of a simulator."""
 

@@ -54,6 +54,8 @@ FINE = 0.03
 """Length of these differences, as a share of those that move the residual by one sigma."""
 SETTLED = 0.3
 """Fall of the cost [log likelihood] by a step that is the last one."""
+UNEXPLAINED = 1.5
+"""Mean squared residual above which exact values are of no use: something else differs."""
 _DAMPING = (1e-9, 1e-3, 1e-2, 1e-1, 1.0, 1e1)
 """Damping factors that are tried at once at the end."""
 
@@ -163,7 +165,9 @@ def settled(likelihood: Likelihood, fit: Fit) -> Fit:
     """
     free, robust, linear = fit.free, fit.robust, fit.linear
     point = replace(fit.point, cost=float(cost(likelihood, [fit.point], robust)[0][0]))
-    for _ in range(SETTLING):
+    for step in range(SETTLING):
+        if step >= 2 and 2 * point.cost > UNEXPLAINED * likelihood.measurements:
+            break
         linear = central(likelihood, point, free, FINE * difference_steps(linear))
         hessian, gradient = normal_equations(likelihood, point, linear, free, robust)
         trials = [damped_step(likelihood, point, free, hessian, gradient, damping) for damping in _DAMPING]

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
-from compass_ros.calibration.refine import Refined, covariance, settled
+from compass_ros.calibration.refine import Refined, covariance
 from compass_ros.discovery.choose import NEEDED, Choice, HeldOut, evidence
 from compass_ros.discovery.formula import Proposal, propose
-from compass_ros.discovery.joint import Joint
+from compass_ros.discovery.joint import Joint, from_second_start
 from compass_ros.discovery.maps import TableMap, residual_map
 from compass_ros.discovery.next_shot import next_experiment
 from compass_ros.discovery.null import Null
@@ -115,7 +115,7 @@ class Finding:
 
     def named(self, joint: Joint, choice: Choice, equal: tuple[tuple[Joint, ...], ...]) -> Discovery:
         """One or two effects with values, errors and evidence."""
-        joint = replace(joint, fit=settled(joint.likelihood, joint.fit))
+        joint = from_second_start(joint)
         std = self._std(joint)
         movers = self.simulator.movers()
         findings, at = [], len(self.simulator.cell.parameters)

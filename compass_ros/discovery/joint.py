@@ -18,6 +18,7 @@ from compass_ros.calibration.least_squares import (
     normal_equations,
 )
 from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.refine import refine, scaled, settled
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
@@ -93,6 +94,25 @@ def converge(joint: Joint, iterations: int = 8) -> Joint:
         joint.likelihood, joint.fit.point, joint.fit.free, iterations, joint.fit.robust, 0.3, joint.fit.linear
     )
     return replace(joint, fit=fit)
+
+
+def from_second_start(joint: Joint) -> Joint:
+    """The better of a fit and another that begins at the cell's first guess, with the effects as they were found.
+
+    Without its effects the simulator had bent other parameters to stand for them. From there, a fit with effects may
+    end in a valley beside the right one.
+    """
+    likelihood, robust = joint.likelihood, joint.fit.robust
+    values = likelihood.prior_mean.copy()
+    of_effects = np.arange(len(joint.simulator.cell.parameters), len(values))
+    values[of_effects] = joint.fit.point.values[of_effects]
+    second = refine(likelihood, values)
+    reached = float(cost(likelihood, [second.fit.point], robust)[0][0])
+    if reached > joint.fit.point.cost:
+        return replace(joint, fit=settled(likelihood, joint.fit))
+    linear = scaled(second.fit.linear, second.likelihood, likelihood)
+    point = replace(second.fit.point, cost=reached)
+    return replace(joint, fit=replace(second.fit, point=point, linear=linear, robust=robust))
 
 
 def _scaled(score: Score, share: float) -> Floats:

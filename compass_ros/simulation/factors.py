@@ -14,6 +14,7 @@ _ANGLES = {"roll": 0, "pitch": 1, "yaw": 2}
 
 def factor_distance(cell: Cell, a: Floats, b: Floats) -> Floats:
     """(..., K) distance by factor between (..., C) observations: 2-norm of positions [m], absolute angle [rad]."""
+    a, b = np.broadcast_arrays(a, b)
     starts, at = {}, 0
     for spec in cell.objects:
         starts[spec.name] = (at, QUANTITY_SIZE[spec.quantity])
