@@ -72,6 +72,7 @@ def parameter_curves(rows: Sequence[Row], task: str) -> Figure:
         axes[i].tick_params(labelsize=7)
     for axis in axes[len(names) :]:
         axis.set_axis_off()
+    figure.supxlabel("simulated rollouts", fontsize=8)
     _legend(figure, axes[0])
     return figure
 
@@ -82,7 +83,7 @@ def difference_curves(rows: Sequence[Row]) -> Figure:
     axis = figure.subplots()
     for method in _methods(rows):
         curves = [_steps(r, lambda s: float(np.mean(s["difference"]))) for r in rows if case_of(r).method == method]
-        _band(axis, curves, method)
+        _band(axis, curves, method, logarithmic=True)
     axis.set_yscale("log")
     axis.set_xlabel("simulated rollouts")
     axis.set_ylabel("mean trajectory difference [m]")
@@ -152,15 +153,21 @@ def _graphs(graphs: Sequence[Floats], titles: Sequence[str], factors: Sequence[s
     return figure
 
 
-def _band(axis: Axes, curves: Sequence[Floats], method: str) -> None:
-    """Mean and standard deviation of (steps, 2) curves (rollouts, value), each held until it changes."""
+def _band(axis: Axes, curves: Sequence[Floats], method: str, logarithmic: bool = False) -> None:
+    """Mean and standard deviation of (steps, 2) curves (rollouts, value), or of their logarithms.
+
+    A value is held until it changes.
+    """
     if not curves:
         return
     at = np.unique(np.concatenate([c[:, 0] for c in curves]))
     held = np.stack([c[np.maximum(np.searchsorted(c[:, 0], at, side="right") - 1, 0), 1] for c in curves])
+    held = np.log(held) if logarithmic else held
     middle, spread = held.mean(axis=0), held.std(axis=0)
+    lines = [middle, middle - spread, middle + spread]
+    middle, low, high = np.exp(lines) if logarithmic else lines
     axis.plot(at, middle, label=method, color=_colour(method), linewidth=1.2)
-    axis.fill_between(at, middle - spread, middle + spread, color=_colour(method), alpha=0.15, linewidth=0)
+    axis.fill_between(at, low, high, color=_colour(method), alpha=0.15, linewidth=0)
 
 
 def _steps(row: Row, read: Any) -> Floats:
