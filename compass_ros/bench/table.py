@@ -7,11 +7,15 @@ from collections.abc import Callable, Iterable, Sequence
 from statistics import fmean, stdev
 
 from compass_ros.bench.outcome import Row, case_of
+from compass_ros.calibration.causal_map import IDENTIFIED
+from compass_ros.cells import load
 from compass_ros.reporting.markdown import markdown_table
 
 PAPER_MAPE = {"compass": 0.22, "npdr": 0.29, "exi-net": 0.95, "tune-net": 3.85}
 """Mean absolute percentage error of the 8 causal parameters of air hockey, 5 seeds (caption of the paper's figure)."""
 
+NINETY = 1.645
+"""Standard deviations on either side of a normal distribution's mean that hold 90 % of it."""
 Read = Callable[[Row], float]
 
 
@@ -30,7 +34,8 @@ def table(rows: Sequence[Row]) -> str:
     methods = sorted({case_of(r).method for r in rows}, key=lambda m: mean(_of(rows, m), held_out_difference))
     main = bool(rows) and case_of(rows[0]).task == "air_hockey" and not case_of(rows[0]).setting()
     header = ["method", "seeds", "MAPE, causal", "MAPE, identified (n)", "held-out d [m]", "share of nominal"]
-    header += ["held-out rms / floor", "kept", "precision", "recall", "rollouts", "simulated [s]"]
+    header += ["held-out rms / floor", "90 % intervals hold", "kept", "precision", "recall"]
+    header += ["rollouts", "simulated [s]"]
     header += ["wall [s]"]
     if main:
         header.insert(3, "paper's MAPE")
@@ -39,7 +44,7 @@ def table(rows: Sequence[Row]) -> str:
         own = _of(rows, name)
         identified = f"{cell(own, number('mape_identified'))} ({mean(own, lambda r: len(_list(r, 'identified'))):.1f})"
         cells = [name, str(len(own)), cell(own, number("mape")), identified, cell(own, held_out_difference)]
-        cells += [cell(own, share_of_nominal), cell(own, number("held_out_over_floor"))]
+        cells += [cell(own, share_of_nominal), cell(own, number("held_out_over_floor")), coverage(own)]
         cells += [cell(own, edge(part)) for part in ("kept", "precision", "recall")]
         cells += [f"{mean(own, number(f)):.0f}" for f in ("rollouts_counted_by_simulator", "simulated_seconds")]
         cells += [cell(own, number("wall_seconds"))]
@@ -80,6 +85,25 @@ def share_of_nominal(row: Row) -> float:
     return _difference(row, "held_out") / _difference(row, "held_out_nominal")
 
 
+def coverage(rows: Iterable[Row]) -> str:
+    """How often the truth is within 1.645 stated standard deviations, over all parameters with noise and such bars.
+
+    Of each row those count whose prior width the recordings halved; `-` for methods without error bars and for
+    recordings without noise, whose errors are the simulator's own last digits.
+    """
+    held: list[bool] = []
+    for row in rows:
+        case = case_of(row)
+        if case.noise_m > 0:
+            values, std = _numbers(row, "values"), _numbers(row, "std")
+            held += [
+                abs(values[p.name] - (p.default if p.target is None else p.target)) < NINETY * std[p.name]
+                for p in load(case.task, case.parameters).spec.parameters
+                if std[p.name] < IDENTIFIED * p.half_width
+            ]
+    return f"{100 * fmean(held):.0f} % of {len(held)}" if held else "-"
+
+
 def mean(rows: Iterable[Row], read: Read) -> float:
     """Mean over the rows that have the number."""
     values = [v for v in map(read, rows) if math.isfinite(v)]
@@ -109,3 +133,10 @@ def _list(row: Row, field: str) -> list[object]:
     value = row[field]
     assert isinstance(value, list)
     return value
+
+
+def _numbers(row: Row, field: str) -> dict[str, float]:
+    """Numbers by name; NaN where the method gives none."""
+    value = row[field]
+    assert isinstance(value, dict)
+    return {name: math.nan if number is None else float(number) for name, number in value.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +14,9 @@ from compass_ros.bench.edges import score_edges, total_effects
 from compass_ros.bench.figures import write_figures
 from compass_ros.bench.outcome import append, case_of, percentage_errors, read
 from compass_ros.bench.run import RESULTS, run_bench
-from compass_ros.bench.table import tables
+from compass_ros.bench.table import coverage, tables
 from compass_ros.bench.world import build
+from compass_ros.cells import load
 from compass_ros.errors import ConfigError, DataError
 from compass_ros.types import Progress
 from test.calibration.planted import planted
@@ -183,6 +184,17 @@ def test_tables_have_means_over_seeds_and_the_papers_number() -> None:
     assert lines[4].endswith("| 20 | 50 | 1.5 |")
     assert lines[4].startswith("| npdr | 1 | 0.2 | 0.29 |")  # the smaller difference first
     assert lines[5].startswith("| compass | 3 | 0.2 ± 0 | 0.22 | - (0.0) | 2 ± 1 | 0.5 ± 0.25 |")
+
+
+def test_coverage_counts_the_parameters_that_a_method_is_sure_of() -> None:
+    known = load("air_hockey").spec.parameters
+    truth = {p.name: p.default if p.target is None else p.target for p in known}
+    sure = {p.name: 0.1 * p.half_width for p in known}
+    off = truth | {"puck1@dyna@damping": -6.9, "puck2@dyna@damping": -6.5, "env@camera@bias_x": 0.5}
+    std: dict[str, float | None] = {**sure, "env@camera@bias_x": None, "env@camera@bias_y": 1.0}
+    row = _row(Case("air_hockey", "causal-map", 0, noise_m=0.001), 1.0) | {"values": off, "std": std}
+    assert coverage([row]) == "98 % of 62"  # -6.9 is 1.8 standard deviations off, -6.5 one
+    assert coverage([row | {"case": asdict(Case("air_hockey", "causal-map", 0))}]) == "-"
 
 
 def test_figures_are_drawn_for_what_is_there(tmp_path: Path) -> None:
