@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from compass_ros.bench.case import Case
 
 ALL = "all"
+BEGIN, END = "<!-- bench: begin -->\n", "<!-- bench: end -->"
 METHODS_HELP = (
     "default (causal-map, ours), compass, npdr, exi-net, tune-net, mujoco-sysid, cma-es, random, or all; "
     "can be given several times"
@@ -55,6 +56,7 @@ def bench(
     threads: Annotated[int, typer.Option(min=0, help="threads of the simulator; 0: all cores")] = 0,
     table: Annotated[bool, typer.Option("--table", help="only print the tables of what is there")] = False,
     figures: Annotated[bool, typer.Option("--figures", help="only draw the figures of what is there")] = False,
+    page: Annotated[Path | None, typer.Option(help="Markdown file whose tables are replaced")] = None,
 ) -> None:
     """Run what is not there yet, one line of results.jsonl a case; a run that was stopped goes on where it was."""
     from compass_ros.bench.case import Case
@@ -71,7 +73,7 @@ def bench(
         with Bar() as bar:
             ran = run_bench(cases, out, bar, threads)
         typer.echo(f"{ran} cases run, {len(cases) - ran} were there already: {out}")
-    _show(out, table or not figures, figures)
+    _show(out, table or not figures, figures, page)
 
 
 def chosen(
@@ -92,7 +94,7 @@ def chosen(
     return case.grid(tasks, unique, range(seeds), noises, base)
 
 
-def _show(out: Path, table: bool, figures: bool) -> None:
+def _show(out: Path, table: bool, figures: bool, page: Path | None) -> None:
     from compass_ros.bench.outcome import read
     from compass_ros.bench.run import RESULTS
     from compass_ros.errors import DataError
@@ -103,7 +105,12 @@ def _show(out: Path, table: bool, figures: bool) -> None:
     if table:
         from compass_ros.bench.table import tables
 
-        typer.echo(tables(rows))
+        text = tables(rows)
+        typer.echo(text)
+        if page:
+            from compass_ros.reporting.markdown import replace_between
+
+            replace_between(page, BEGIN, END, f"\n{text}\n\n")
     if figures:
         from compass_ros.bench.figures import write_figures
 

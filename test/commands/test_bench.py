@@ -11,7 +11,7 @@ from compass_ros.bench.case import Case
 from compass_ros.bench.outcome import case_of, read
 from compass_ros.bench.run import RESULTS
 from compass_ros.calibration.methods import METHODS
-from compass_ros.commands.bench import chosen
+from compass_ros.commands.bench import BEGIN, END, chosen
 from test.conftest import Run
 
 TINY = ("--iterations", 2, "--real", 2, "--sim", 2, "--seeds", 1)
@@ -48,9 +48,12 @@ def test_a_run_is_written_resumed_and_drawn(run: Run, tmp_path: Path) -> None:
     _, out, _ = run("bench", "--method", "random", *TINY, "--noise", 0.001, "--out", tmp_path)
     assert "0 cases run, 1 were there already" in out
     before = (tmp_path / RESULTS).read_bytes()
-    status, out, _ = run("bench", "--table", "--out", tmp_path)
+    page = tmp_path / "page.md"
+    page.write_text(f"before\n{BEGIN}old\n{END}\nafter\n")
+    status, out, _ = run("bench", "--table", "--out", tmp_path, "--page", page)
     assert status == 0
     assert out.startswith("### air_hockey")
+    assert page.read_text() == f"before\n{BEGIN}\n{out}\n{END}\nafter\n"
     status, out, _ = run("bench", "--figures", "--out", tmp_path)
     assert status == 0
     assert (tmp_path / RESULTS).read_bytes() == before
