@@ -48,6 +48,8 @@ TRIED = 6
 """Names that are fitted at once, the most promising first; as many again where none of them is enough."""
 PROMISING = 0.1
 """Least first-order gain, as a share of the best, to be tried."""
+SLIGHT = 0.005
+"""Share of the excess that a further step of a fit must promise: models are compared by shares of it."""
 HELD_OUT_SHARE = 0.4
 """Share of the held-out excess that a model must remove where there is one."""
 HELD_OUT_SEEN = 15.0
@@ -155,15 +157,16 @@ def choose(space: Space, scores: Sequence[Score], candidates: Sequence[Candidate
     """Fit the promising candidates; where none is enough, others, and then the best of them with a second one."""
     base = float(cost(space.likelihood, [space.fit.point], space.fit.robust)[0][0])
     floor = floor_of(space.likelihood, space.fit, base)
+    slight = SLIGHT * (base - floor)
     singles: list[Joint] = []
     ended: list[Joint] = []
     for promising in _rounds(scores):
-        tried = [fit_jointly(space, [s], 4, tolerance=2.0) for s in promising]
+        tried = [fit_jointly(space, [s], 4, max(2.0, slight)) for s in promising]
         best = min((j.fit.point.cost for j in tried), default=base)
         tried.sort(key=_worth)
-        leaders = [further(j) if j.fit.point.cost < 0.5 * (base + best) else j for j in tried[:LEADERS]]
+        leaders = [further(j, slight) if j.fit.point.cost < 0.5 * (base + best) else j for j in tried[:LEADERS]]
         singles = sorted([*singles, *leaders, *tried[LEADERS:]], key=_worth)
-        ended = [j if any(j is other for other in ended) else converge(j) for j in singles[:2]]
+        ended = [j if any(j is other for other in ended) else converge(j, slight) for j in singles[:2]]
         singles = sorted([*ended, *singles[2:]], key=_worth)
         if not singles:
             break
@@ -180,8 +183,8 @@ def choose(space: Space, scores: Sequence[Score], candidates: Sequence[Candidate
         return Choice((), None, base - floor, floor)
     different = _different(singles)
     clear = choice.share(different[0]) > LEADS
-    firsts = different[:1] if clear else [different[0], *(converge(j, 4) for j in different[1:2])]
-    pair = _second(firsts, candidates)
+    firsts = different[:1] if clear else [different[0], *(converge(j, slight, 4) for j in different[1:2])]
+    pair = _second(firsts, candidates, slight)
     if pair and pair.fit.point.cost < cheapest.fit.point.cost:
         floor = floor_of(pair.likelihood, pair.fit, pair.fit.point.cost)
     return Choice(tuple(singles), pair, base - floor, floor)
@@ -204,7 +207,7 @@ def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOu
     first = choice.singles[0]
     if 1 - choice.share(first) < NEEDED:
         return choice
-    pair = _second([first], candidates)
+    pair = _second([first], candidates, SLIGHT * choice.excess)
     if pair is None:
         return choice
     floor = floor_of(pair.likelihood, pair.fit, pair.fit.point.cost)
@@ -226,10 +229,11 @@ def evidence(joint: Joint, unseen: HeldOut) -> float:
     return -_worth(joint) - unseen.surprise(joint) / joint.likelihood.correlation_time
 
 
-def further(joint: Joint) -> Joint:
-    """A promising fit, continued."""
+def further(joint: Joint, slight: float) -> Joint:
+    """A promising fit, continued while a step gains more than is `slight` [log likelihood]."""
+    tolerance = max(1.0, slight)
     fit = minimise(
-        joint.likelihood, joint.fit.point, joint.fit.free, 5, joint.fit.robust, 1.0, joint.fit.linear, fresh=False
+        joint.likelihood, joint.fit.point, joint.fit.free, 5, joint.fit.robust, tolerance, joint.fit.linear, fresh=False
     )
     return replace(joint, fit=fit)
 
@@ -262,7 +266,7 @@ def _promising(scores: Sequence[Score]) -> list[Score]:
     return out
 
 
-def _second(firsts: Sequence[Joint], candidates: Sequence[Candidate]) -> Joint | None:
+def _second(firsts: Sequence[Joint], candidates: Sequence[Candidate], slight: float) -> Joint | None:
     """Some fits of one effect, each with the candidates that promise most of what it leaves: the best pair."""
     found: list[Joint] = []
     for first in firsts:
@@ -271,10 +275,10 @@ def _second(firsts: Sequence[Joint], candidates: Sequence[Candidate]) -> Joint |
         own = {a.effect.name for a in first.added}
         scores = [score(there, c) for c in candidates if c.name not in own]
         for s in next(_rounds(scores), []):
-            joint = fit_jointly(there, [s], 4, tolerance=2.0)
+            joint = fit_jointly(there, [s], 4, max(2.0, slight))
             found.append(Joint(joint.simulator, joint.likelihood, joint.fit, (*first.added, *joint.added)))
-    best = sorted((further(j) for j in sorted(found, key=_worth)[:3]), key=_worth)
-    return converge(best[0]) if best else None
+    best = sorted((further(j, slight) for j in sorted(found, key=_worth)[:3]), key=_worth)
+    return converge(best[0], slight) if best else None
 
 
 def _different(singles: Sequence[Joint]) -> list[Joint]:

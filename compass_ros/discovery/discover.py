@@ -33,6 +33,8 @@ SOMETHING = 0.06
 """Excess of chi-square (`smooth_excess`) from which something is there although no candidate stands out."""
 NOTICED = 0.25
 """Least rms movement by what is missing, as a share of the cell's expected noise: less is the tracker's own error."""
+RESTARTED = 0.15
+"""Share of the excess by which a plain fit from elsewhere must be better to be the new beginning."""
 MIN_EPISODES = 3
 
 
@@ -115,7 +117,9 @@ def _restarted(refined: Refined, choice: Choice, simulator: Simulator) -> Refine
     best = choice.pair or choice.singles[0]
     values = best.fit.point.values[: len(simulator.cell.parameters)]
     start = Point(values, best.fit.point.launch, np.inf)
-    fit = minimise(refined.likelihood, start, refined.fit.free, 8, refined.fit.robust, 1.0, fresh=False)
-    if refined.fit.point.cost - fit.point.cost < max(0.15 * choice.excess, 5.0):
+    clearly = max(RESTARTED * choice.excess, 5.0)
+    tolerance = 0.2 * clearly
+    fit = minimise(refined.likelihood, start, refined.fit.free, 8, refined.fit.robust, tolerance, fresh=False)
+    if refined.fit.point.cost - fit.point.cost < clearly:
         return None
     return polish(refined.likelihood, fit.point)

@@ -88,10 +88,11 @@ def fit_jointly(space: Space, scores: Sequence[Score], iterations: int, toleranc
     return Joint(simulator, likelihood, fit, added)
 
 
-def converge(joint: Joint, iterations: int = 8) -> Joint:
-    """To the end, with differences at the solution."""
+def converge(joint: Joint, slight: float, iterations: int = 8) -> Joint:
+    """Until a step gains no more than is `slight` [log likelihood], with differences at the solution."""
+    tolerance = max(0.3, slight)
     fit = minimise(
-        joint.likelihood, joint.fit.point, joint.fit.free, iterations, joint.fit.robust, 0.3, joint.fit.linear
+        joint.likelihood, joint.fit.point, joint.fit.free, iterations, joint.fit.robust, tolerance, joint.fit.linear
     )
     return replace(joint, fit=fit)
 
