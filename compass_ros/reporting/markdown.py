@@ -11,7 +11,8 @@ from compass_ros.reporting.atomic import write_text
 
 def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Cells are text, as they shall be read; no line end after the last row."""
-    return "\n".join(f"| {' | '.join(row)} |" for row in (header, ("---",) * len(header), *rows))
+    first, *others = [f"| {' | '.join(row)} |" for row in (header, *rows)]
+    return "\n".join([first, "|" + "---|" * len(header), *others])
 
 
 def between(page: str, begin: str, end: str) -> str:

@@ -164,10 +164,10 @@ def test_no_worlds_make_no_claims() -> None:
 
 def test_the_page_keeps_its_text_and_lists_what_was_wrong(tmp_path: Path) -> None:
     page = tmp_path / "proof.md"
-    page.write_text(f"before\n{BEGIN}\nstale text\n{END}\nafter\n")
+    page.write_text(f"before\n{BEGIN}stale text\n{END}\nafter\n")
     write_page(page, worlds({}, {"right": False, "verdict": "named", "found": ["magnus"]}))
     text = page.read_text()
-    assert text.startswith(f"before\n{BEGIN}\n")
+    assert text.startswith(f"before\n{BEGIN}###")
     assert text.endswith(f"{END}\nafter\n")
     assert "stale text" not in text
     assert "| swirl | named: magnus | 1 |" in text
