@@ -67,8 +67,11 @@ class Demo:
 
 @pytest.fixture
 def started(tmp_path: Path) -> Iterator[list[Demo]]:
+    # Who runs the tests in the background has them, and so their children, ignore SIGINT.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     demos: list[Demo] = []
     yield demos
+    signal.signal(signal.SIGINT, before)
     for demo in demos:
         if demo.process.poll() is None:
             os.killpg(demo.process.pid, signal.SIGINT)
