@@ -58,7 +58,7 @@ def write_figures(rows: Sequence[Row], out: Path) -> list[Path]:
 def parameter_curves(rows: Sequence[Row], task: str) -> Figure:
     """The causal parameters against rollouts spent; mean line and standard deviation over seeds; dashed: the target."""
     names = _strings(rows[0], "causal")
-    targets = {s.name: s.target if s.target is not None else s.default for s in load(task).spec.parameters}
+    targets = {s.name: s.truth for s in load(task).spec.parameters}
     columns = min(4, len(names))
     lines = -(-len(names) // columns)
     figure = Figure(figsize=(3.4 * columns, 2.5 * lines), layout="constrained")
@@ -70,9 +70,10 @@ def parameter_curves(rows: Sequence[Row], task: str) -> Figure:
             _band(axes[i], curves, method)
         axes[i].set_title(name, fontsize=8)
         axes[i].tick_params(labelsize=7)
+        if i + columns >= len(names):
+            axes[i].set_xlabel("simulated rollouts", fontsize=8)
     for axis in axes[len(names) :]:
         axis.set_axis_off()
-    figure.supxlabel("simulated rollouts", fontsize=8)
     _legend(figure, axes[0])
     return figure
 
