@@ -32,11 +32,12 @@ from diagnostic_msgs.msg import DiagnosticArray
 from domain_coordinator import domain_id
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rclpy.qos import qos_profile_sensor_data
 from std_srvs.srv import Trigger
 
 from compass_ros.episodes import Source, read_episode
 from compass_ros.nodes.images import stamp_ns
+from compass_ros.nodes.qos import LATCHED
 from compass_ros.reporting.markdown import markdown_table, replace_between
 
 ROOT = Path(__file__).parents[1]
@@ -106,10 +107,9 @@ class Watcher:
     def __init__(self, heard: Heard) -> None:
         self.node = Node("soak")
         self._heard = heard
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.node.create_subscription(PoseWithCovarianceStamped, TRACKED[0], self._on_pose, qos_profile_sensor_data)
         self.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
-        self.node.create_subscription(CalibrationStatus, "/calibrator/status", self._on_status, latched)
+        self.node.create_subscription(CalibrationStatus, "/calibrator/status", self._on_status, LATCHED)
         self._again = self.node.create_client(Trigger, "/calibrator/recalibrate")
         self._start = self.node.create_client(StartEpisode, "/recorder/start_episode")
         self._stop = self.node.create_client(StopEpisode, "/recorder/stop_episode")

@@ -97,7 +97,7 @@ def coverage(rows: Iterable[Row]) -> str:
         if case.noise_m > 0:
             values, std = _numbers(row, "values"), _numbers(row, "std")
             held += [
-                abs(values[p.name] - (p.default if p.target is None else p.target)) < NINETY * std[p.name]
+                abs(values[p.name] - p.truth) < NINETY * std[p.name]
                 for p in load(case.task, case.parameters).spec.parameters
                 if std[p.name] < IDENTIFIED * p.half_width
             ]

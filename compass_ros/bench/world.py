@@ -44,7 +44,7 @@ class World:
 def build(case: Case, threads: int = 0) -> World:
     """Play and record the shots of a case. Raises ConfigError where the cell has no target values."""
     cell = load(case.task, case.parameters)
-    truth = np.array([s.default if s.target is None else s.target for s in cell.spec.parameters])
+    truth = np.array([s.truth for s in cell.spec.parameters])
     if all(s.target is None for s in cell.spec.parameters):
         raise ConfigError(
             f"{cell.path}: no parameter has a target; a benchmark needs the values of the simulated real cell"

@@ -39,7 +39,8 @@ def acting(likelihood: Likelihood, point: Point, share: float) -> Bools:
     if not many(likelihood):
         return everything
     groups = alike([p.name for p in likelihood.parameters])
-    step = moved_by(likelihood, point, share)
+    every = np.arange(len(likelihood.parameters))
+    step = inward(likelihood, point, every, np.full(len(every), share))
     values = np.tile(point.values, (1 + len(groups), 1))
     for row, members in zip(values[1:], groups, strict=True):
         row[members] += step[members]
@@ -50,12 +51,6 @@ def acting(likelihood: Likelihood, point: Point, share: float) -> Bools:
     for members, same in zip(groups, (residual[1:] == residual[0]).all(axis=1), strict=True):
         everything[members] = not same
     return everything
-
-
-def moved_by(likelihood: Likelihood, point: Point, share: float) -> Floats:
-    """(P,) steps of `share` prior widths, to the side that stays inside the bounds."""
-    everything = np.arange(len(likelihood.parameters))
-    return inward(likelihood, point, everything, np.full(len(everything), share))
 
 
 def alike(names: list[str]) -> list[Ints]:

@@ -73,6 +73,11 @@ class ParameterSpec:
     of: str = Field("", max_length=200)
     """Name of the element whose field it is."""
 
+    @property
+    def truth(self) -> float:
+        """Value in that "real" simulator: the target, or the default where it has none."""
+        return self.default if self.target is None else self.target
+
 
 @validated(frozen=True, config=_strict, kw_only=True)
 class CellSpec:

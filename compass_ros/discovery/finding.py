@@ -134,9 +134,10 @@ class Finding:
         where = where_of(joint.added[0], first, movers)
         rivals = [joint, *equal[0]]
         ambiguous = len(rivals) > 1
-        following = next_experiment(self.simulator, self._plain(), rivals, self.seed).sentence if ambiguous else ""
+        following = ""
         lacks = " and ".join(a.effect.sentence for a in joint.added)
         if ambiguous:
+            following = next_experiment(self.simulator, self.refined.likelihood, rivals, self.seed).sentence
             lacks = "one of these: " + "; ".join(a.effect.sentence for j in rivals for a in j.added)
         values = "; ".join(value_of(f) for f in findings)
         sentence = f"{place(where)}, the simulator lacks {lacks}; {values}; {self._errors(joint)}."
@@ -233,9 +234,6 @@ class Finding:
         variance = np.diag(covariance(joint.likelihood, joint.fit))[: len(free)]
         std[free] *= np.sqrt(variance + np.where(of_effects, shift(joint), 0.0) ** 2)
         return std
-
-    def _plain(self) -> Likelihood:
-        return self.refined.likelihood
 
     def _tried(self, choice: Choice, chosen: Joint | None) -> tuple[Tried, ...]:
         movers = self.simulator.movers()
