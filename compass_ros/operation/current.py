@@ -11,6 +11,7 @@ import numpy as np
 from compass_ros.cells import Cell
 from compass_ros.cells.auto import with_auto
 from compass_ros.episodes import Source, default_sources, find_bags, read_episode
+from compass_ros.errors import ConfigError
 from compass_ros.reporting.result_json import read_result
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects.exported import read_effects
@@ -70,12 +71,18 @@ class Residuals:
 
 
 def current(cell: Cell, version: Path | None = None, threads: int = 0) -> Current:
-    """The cell as configured, or with the result.json and effects.yaml of a folder. Raises ConfigError."""
+    """The cell as configured, or with the result.json and effects.yaml of a folder.
+
+    Raises ConfigError, also for a folder of another cell.
+    """
     if version is None or not (version / "result.json").exists():
         simulator = Simulator(cell, threads=threads)
         return Current(simulator, simulator.defaults)
     where = str(version / "result.json")
-    rows = read_result(version / "result.json")["parameters"]
+    content = read_result(version / "result.json")
+    if content["cell"] != cell.name:
+        raise ConfigError(f"{version}: parameters of '{content['cell']}', this cell is '{cell.name}'")
+    rows = content["parameters"]
     own = {p.name for p in cell.parameters}
     if any(row["name"] not in own for row in rows):
         cell = with_auto(cell)  # calibrated with `--parameters auto`

@@ -74,6 +74,8 @@ def test_another_cells_parameters_are_refused(cell: Cell, tmp_path: Path) -> Non
     result = write_calibration(tmp_path / "one", cell, {})
     with pytest.raises(ConfigError, match="parameters of 'air_hockey', this cell is 'push_i'"):
         Versions(tmp_path / "versions", "push_i").apply(result, {})
+    with pytest.raises(ConfigError, match="parameters of 'air_hockey', this cell is 'push_i'"):
+        current(load("push_i"), result)
 
 
 @pytest.mark.parametrize(
