@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +21,7 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import ROBUST, calmed, covariance
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.impulses import impulses
-from compass_ros.discovery.joint import Joint, converge, fit_jointly
+from compass_ros.discovery.joint import Joint, converge, fit_jointly, from_second_start
 from compass_ros.discovery.remainder import smooth_excess
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import score
@@ -34,18 +34,28 @@ SMALL = 0.12
 """Excess of chi-square under which a remainder is put down to the effect's functional form..."""
 FORM_SHARE = 0.6
 """...if the effect explains at least this share."""
-NEEDED = 0.1
-"""Share of the excess that each effect of a pair must be worth."""
+EQUAL = 3.0
+"""Log evidence within which two effects are told apart by nothing."""
+EQUAL_SHARE = 0.015
+"""The same as a share of the excess: functional forms are never exactly right."""
+NEEDED = 0.05
+"""Share of the excess that an effect must be worth beside another that is enough."""
 FORM_LEFT = 0.25
 """Part of what one effect leaves that a second may leave to be its cause."""
 OF_LIMIT = 8.0
 """Log evidence by which an effect must surpass what it comes to at an end of its shapes."""
 LEADS = 0.6
 """Share from which the best effect is surely one of two; below, the second best may be instead."""
+NEARLY = 0.85
+"""Share from which the best effect is first fitted from a second start before others are tried."""
 LEADERS = 4
 """Best fits that are continued, and of which one may be named."""
-TRIED = 6
-"""Names that are fitted at once, the most promising first; as many again where none of them is enough."""
+ASKED = 12
+"""Names whose fit is sketched, the most promising first."""
+SKETCHED = 2
+"""Steps of a sketch."""
+TRIED = 5
+"""Sketches that are fitted at once, the best first; as many again where none of them is enough."""
 PROMISING = 0.1
 """Least first-order gain, as a share of the best, to be tried."""
 SLIGHT = 0.005
@@ -88,6 +98,8 @@ class Choice:
     """Cost that the noise alone leaves."""
     two: bool = False
     """The first single is enough, and the pair still explains what it leaves: there are two."""
+    equal: tuple[Joint, ...] = ()
+    """Where the first single is enough: others that explain the recordings as well."""
 
     def share(self, joint: Joint) -> float:
         """Part of the excess that a model explains."""
@@ -96,6 +108,19 @@ class Choice:
     def remainder(self, joint: Joint) -> float:
         """Excess of chi-square that a model leaves."""
         return 2 * max(joint.fit.point.cost - self.floor, 0.0) / joint.likelihood.measurements
+
+    def explains(self, pair: Joint, first: Joint) -> bool:
+        """Whether what one effect leaves has a second cause.
+
+        What a wrong functional form leaves is explained in part by many effects and wholly by none; a second effect is
+        explained wholly by one.
+        """
+        return self.remainder(pair) < FORM_LEFT * self.remainder(first)
+
+    def good(self, unseen: HeldOut) -> list[Joint]:
+        """Models of one effect that may be named, the best first."""
+        good = [j for j in self.singles[:LEADERS] if self.enough(j) and unseen.helps(j)]
+        return sorted(good, key=lambda j: -evidence(j, unseen))
 
     def enough(self, joint: Joint) -> bool:
         """Whether a model explains what there is to explain."""
@@ -156,38 +181,70 @@ def floor_of(likelihood: Likelihood, fit: Fit, reached: float) -> float:
 def choose(space: Space, scores: Sequence[Score], candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
     """Fit the promising candidates; where none is enough, others, and then the best of them with a second one."""
     base = float(cost(space.likelihood, [space.fit.point], space.fit.robust)[0][0])
-    floor = floor_of(space.likelihood, space.fit, base)
-    slight = SLIGHT * (base - floor)
-    singles: list[Joint] = []
-    ended: list[Joint] = []
-    for promising in _rounds(scores):
-        tried = [fit_jointly(space, [s], 4, max(2.0, slight)) for s in promising]
-        best = min((j.fit.point.cost for j in tried), default=base)
-        tried.sort(key=_worth)
-        leaders = [further(j, slight) if j.fit.point.cost < 0.5 * (base + best) else j for j in tried[:LEADERS]]
-        singles = sorted([*singles, *leaders, *tried[LEADERS:]], key=_worth)
-        ended = [j if any(j is other for other in ended) else converge(j, slight) for j in singles[:2]]
-        singles = sorted([*ended, *singles[2:]], key=_worth)
-        if not singles:
-            break
+    slight = SLIGHT * (base - floor_of(space.likelihood, space.fit, base))
+    choice = _weighed([], base, floor_of(space.likelihood, space.fit, base))
+    rounds = _rounds(space, scores)
+    for promising in rounds:
+        choice = _weighed(_fitted(promising, choice.singles, base, slight), base, choice.floor)
+        best, *others = choice.singles
+        promises = LEADS if promising is rounds[-1] else NEARLY
+        if not choice.good(unseen) and choice.share(best) > promises:
+            choice = _weighed([from_second_start(best), *others], base, choice.floor)
+        if good := choice.good(unseen):
+            first = simplest(good)
+            equal = _equals(first, choice, unseen)
+            others = [j for j in choice.singles if j is not first]
+            choice = _weighed([from_second_start(first), *others], base, choice.floor)
+            return _with_second(replace(choice, equal=equal), candidates, unseen)
+    if not choice.singles:
+        return choice
+    best, *others = _different(choice.singles)
+    firsts = [best] if choice.share(best) > LEADS else [best, *(converge(j, slight, 4) for j in others[:1])]
+    pair = _second(firsts, candidates, slight)
+    if pair and pair.fit.point.cost < min(j.fit.point.cost for j in choice.singles):
+        floor = floor_of(pair.likelihood, pair.fit, pair.fit.point.cost)
+        choice = replace(choice, excess=choice.excess + choice.floor - floor, floor=floor)
+    return replace(choice, pair=pair)
+
+
+def _rounds(space: Space, scores: Sequence[Score]) -> list[list[Joint]]:
+    """Sketches of the fits to try, most promising first, in up to two rounds.
+
+    What the simulator says of two cheap steps orders candidates better than their first-order gain does.
+    """
+    sketches = sorted((fit_jointly(space, [s], SKETCHED, anew=False) for s in _promising(scores)), key=_worth)
+    return [part for part in (sketches[:TRIED], sketches[TRIED : 2 * TRIED]) if part]
+
+
+def _fitted(promising: Sequence[Joint], before: Sequence[Joint], base: float, slight: float) -> list[Joint]:
+    """Models with one effect, those of earlier rounds among them, the best first and converged."""
+    tried = sorted((further(j, slight, 4) for j in promising), key=_worth)
+    best = min(j.fit.point.cost for j in tried)
+    leaders = [further(j, slight, 5) if j.fit.point.cost < 0.5 * (base + best) else j for j in tried[:LEADERS]]
+    singles = sorted([*before, *leaders, *tried[LEADERS:]], key=_worth)
+    ended = [j if any(j is other for other in before[:2]) else converge(j, slight) for j in singles[:2]]
+    return sorted([*ended, *singles[2:]], key=_worth)
+
+
+def _weighed(singles: Sequence[Joint], base: float, floor: float) -> Choice:
+    """Shares are of what the best of them shows to be above the noise."""
+    if singles:
         cheapest = min(singles, key=lambda j: j.fit.point.cost)
         floor = floor_of(cheapest.likelihood, cheapest.fit, cheapest.fit.point.cost)
-        choice = Choice(tuple(singles), None, base - floor, floor)
-        good = [j for j in singles[:LEADERS] if choice.enough(j) and unseen.helps(j)]
-        good.sort(key=lambda j: -evidence(j, unseen))
-        if good:
-            first = simplest(good)
-            others = [j for j in singles if j is not first]
-            return _with_second(Choice((first, *others), None, base - floor, floor), candidates, unseen)
-    if not singles:
-        return Choice((), None, base - floor, floor)
-    different = _different(singles)
-    clear = choice.share(different[0]) > LEADS
-    firsts = different[:1] if clear else [different[0], *(converge(j, slight, 4) for j in different[1:2])]
-    pair = _second(firsts, candidates, slight)
-    if pair and pair.fit.point.cost < cheapest.fit.point.cost:
-        floor = floor_of(pair.likelihood, pair.fit, pair.fit.point.cost)
-    return Choice(tuple(singles), pair, base - floor, floor)
+    return Choice(tuple(singles), None, base - floor, floor)
+
+
+def _equals(best: Joint, choice: Choice, unseen: HeldOut) -> tuple[Joint, ...]:
+    """Other effects that explain the recordings as well: within EQUAL of log evidence, or EQUAL_SHARE."""
+    top = evidence(best, unseen)
+    margin = max(EQUAL, EQUAL_SHARE * choice.excess / best.likelihood.correlation_time)
+    return tuple(
+        joint
+        for joint in _different(choice.singles)
+        if best.name not in (joint.name, joint.added[0].effect.limit)
+        and top - evidence(joint, unseen) < margin
+        and unseen.helps(joint)
+    )
 
 
 def simplest(good: Sequence[Joint]) -> Joint:
@@ -199,11 +256,7 @@ def simplest(good: Sequence[Joint]) -> Joint:
 
 
 def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
-    """The same with a second effect where the first leaves something, and that has a cause of its own.
-
-    What a wrong functional form leaves is explained in part by many effects and wholly by none; a second effect is
-    explained wholly by one.
-    """
+    """The same with a second effect where the first leaves something, and that has a cause of its own."""
     first = choice.singles[0]
     if 1 - choice.share(first) < NEEDED:
         return choice
@@ -212,11 +265,10 @@ def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOu
         return choice
     floor = floor_of(pair.likelihood, pair.fit, pair.fit.point.cost)
     choice = replace(choice, pair=pair, floor=floor, excess=choice.excess + choice.floor - floor)
+    needed = choice.share(pair) - choice.share(first) > NEEDED
     seen, rest = unseen.surprise(first) - unseen.surprise(pair), unseen.surprise(first) - unseen.floor
     predicts = seen > HELD_OUT_SHARE * rest if rest > HELD_OUT_SEEN else seen > -5.0
-    wholly = choice.remainder(pair) < FORM_LEFT * choice.remainder(first)
-    needed = choice.share(pair) - choice.share(first) > NEEDED
-    return replace(choice, two=predicts and wholly and needed)
+    return replace(choice, two=predicts and needed and choice.explains(pair, first))
 
 
 def _worth(joint: Joint) -> float:
@@ -229,23 +281,11 @@ def evidence(joint: Joint, unseen: HeldOut) -> float:
     return -_worth(joint) - unseen.surprise(joint) / joint.likelihood.correlation_time
 
 
-def further(joint: Joint, slight: float) -> Joint:
+def further(joint: Joint, slight: float, iterations: int) -> Joint:
     """A promising fit, continued while a step gains more than is `slight` [log likelihood]."""
-    tolerance = max(1.0, slight)
-    fit = minimise(
-        joint.likelihood, joint.fit.point, joint.fit.free, 5, joint.fit.robust, tolerance, joint.fit.linear, fresh=False
-    )
+    fit, tolerance = joint.fit, max(1.0, slight)
+    fit = minimise(joint.likelihood, fit.point, fit.free, iterations, fit.robust, tolerance, fit.linear, fresh=False)
     return replace(joint, fit=fit)
-
-
-def _rounds(scores: Sequence[Score]) -> Iterator[list[Score]]:
-    """Candidates to try, most promising first, in two rounds."""
-    ordered = _promising(scores)
-    names = list(dict.fromkeys(s.candidate.name for s in ordered))
-    for first in (0, TRIED):
-        chosen = names[first : first + TRIED]
-        if chosen:
-            yield [s for s in ordered if s.candidate.name in chosen]
 
 
 def _promising(scores: Sequence[Score]) -> list[Score]:
@@ -254,14 +294,14 @@ def _promising(scores: Sequence[Score]) -> list[Score]:
     for s in sorted(scores, key=lambda s: -s.gain):
         best.setdefault(s.candidate.name, []).append(s)
     top = max((s[0].gain for s in best.values()), default=0.0)
-    names = sorted(best.values(), key=lambda group: -group[0].gain)[: 2 * TRIED]
+    names = sorted(best.values(), key=lambda group: -group[0].gain)[:ASKED]
     out = []
     for group in names:
         if group[0].gain < max(PROMISING * top, 1e-9):
             continue
         out.append(group[0])
         together = max(group, key=lambda s: len(s.candidate.attached.objects))
-        if together is not group[0] and together.gain > 0.6 * group[0].gain and group[0].gain > 0.7 * top:
+        if together is not group[0] and together.gain > 0.6 * group[0].gain:
             out.append(together)
     return out
 
@@ -274,10 +314,10 @@ def _second(firsts: Sequence[Joint], candidates: Sequence[Candidate], slight: fl
         there = Space(first.simulator, first.likelihood, first.fit, pushes)
         own = {a.effect.name for a in first.added}
         scores = [score(there, c) for c in candidates if c.name not in own]
-        for s in next(_rounds(scores), []):
-            joint = fit_jointly(there, [s], 4, max(2.0, slight))
+        for sketch in next(iter(_rounds(there, scores)), []):
+            joint = further(sketch, slight, 4)
             found.append(Joint(joint.simulator, joint.likelihood, joint.fit, (*first.added, *joint.added)))
-    best = sorted((further(j, slight) for j in sorted(found, key=_worth)[:3]), key=_worth)
+    best = sorted((further(j, slight, 5) for j in sorted(found, key=_worth)[:3]), key=_worth)
     return converge(best[0], slight) if best else None
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import Refined, covariance
-from compass_ros.discovery.choose import NEEDED, Choice, HeldOut, evidence
+from compass_ros.discovery.choose import Choice, HeldOut
 from compass_ros.discovery.formula import Proposal, propose
 from compass_ros.discovery.joint import Joint, from_second_start
 from compass_ros.discovery.maps import TableMap, residual_map
@@ -22,11 +22,6 @@ from compass_ros.discovery.unknown import whereabouts
 from compass_ros.discovery.words import errors, place, value_of, where_of
 from compass_ros.simulation import Simulator
 from compass_ros.types import EffectFinding, EffectParameter, Evidence, Floats, Mismatch, Verdict
-
-EQUAL = 3.0
-"""Log evidence within which two effects are told apart by nothing."""
-EQUAL_SHARE = 0.015
-"""The same as a share of the excess: functional forms are never exactly right."""
 
 
 @dataclass(frozen=True)
@@ -106,9 +101,9 @@ class Finding:
         if choice.two and choice.pair is not None:
             return self.named(choice.pair, choice, ((), ()))
         if best is not None and choice.enough(best) and unseen.helps(best):
-            return self.named(best, choice, (self._equals(best, choice, unseen),))
+            return self.named(best, choice, (choice.equal,))
         pair = choice.pair
-        both = pair is not None and best is not None and choice.share(pair) - choice.share(best) > NEEDED
+        both = pair is not None and best is not None and choice.explains(pair, best)
         if pair is not None and both and choice.enough(pair) and unseen.helps(pair):
             return self.named(pair, choice, ((), ()))
         return self.unknown(choice)
@@ -176,24 +171,6 @@ class Finding:
             after,
             self.warnings,
         )
-
-    def _equals(self, best: Joint, choice: Choice, unseen: HeldOut) -> tuple[Joint, ...]:
-        """Other effects that explain the recordings as well: within EQUAL of log evidence, or EQUAL_SHARE."""
-        kappa = self.noise.correlation_time
-        top = evidence(best, unseen)
-        margin = max(EQUAL, EQUAL_SHARE * choice.excess / kappa)
-        seen, out = {best.name}, []
-        for joint in choice.singles[1:]:
-            contains = joint.added[0].effect.limit == best.name
-            if (
-                joint.name not in seen
-                and not contains
-                and top - evidence(joint, unseen) < margin
-                and unseen.helps(joint)
-            ):
-                out.append(joint)
-            seen.add(joint.name)
-        return tuple(out)
 
     def _held_out(self, simulator: Simulator, values: Floats) -> float:
         """rms distance on held-out episodes [m]."""

@@ -37,6 +37,8 @@ class Joint:
     fit: Fit
     added: tuple[Attached, ...]
     """The effects of this fit."""
+    settled: bool = False
+    """From two starts, and at its optimum."""
 
     @property
     def name(self) -> str:
@@ -63,8 +65,8 @@ def widened(simulator: Simulator, likelihood: Likelihood, added: Sequence[Attach
     )
 
 
-def fit_jointly(space: Space, scores: Sequence[Score], iterations: int, tolerance: float = 1.0) -> Joint:
-    """Start from the first-order solution of one or more candidates and converge."""
+def fit_jointly(space: Space, scores: Sequence[Score], iterations: int, anew: bool = True) -> Joint:
+    """Start from the first-order solution of one or more candidates and converge; `anew` as in `minimise`."""
     added = tuple(s.candidate.attached for s in scores)
     simulator, likelihood = widened(space.simulator, space.likelihood, added)
     numbers = np.concatenate([s.numbers for s in scores])
@@ -84,7 +86,7 @@ def fit_jointly(space: Space, scores: Sequence[Score], iterations: int, toleranc
         start = replace(starts[1], cost=np.inf)
     everything = np.concatenate([free, len(base.values) + np.arange(len(numbers))])
     linear = _extended(space, likelihood, start, residuals[max(best, 1)], everything)
-    fit = minimise(likelihood, start, everything, iterations, space.fit.robust, tolerance, linear, fresh=False)
+    fit = minimise(likelihood, start, everything, iterations, space.fit.robust, 1.0, linear, fresh=False, anew=anew)
     return Joint(simulator, likelihood, fit, added)
 
 
@@ -103,6 +105,8 @@ def from_second_start(joint: Joint) -> Joint:
     Without its effects the simulator had bent other parameters to stand for them. From there, a fit with effects may
     end in a valley beside the right one.
     """
+    if joint.settled:
+        return joint
     likelihood, robust = joint.likelihood, joint.fit.robust
     values = likelihood.prior_mean.copy()
     of_effects = np.arange(len(joint.simulator.cell.parameters), len(values))
@@ -110,10 +114,10 @@ def from_second_start(joint: Joint) -> Joint:
     second = refine(likelihood, values)
     reached = float(cost(likelihood, [second.fit.point], robust)[0][0])
     if reached > joint.fit.point.cost:
-        return replace(joint, fit=settled(likelihood, joint.fit))
+        return replace(joint, fit=settled(likelihood, joint.fit), settled=True)
     linear = scaled(second.fit.linear, second.likelihood, likelihood)
     point = replace(second.fit.point, cost=reached)
-    return replace(joint, fit=replace(second.fit, point=point, linear=linear, robust=robust))
+    return replace(joint, fit=replace(second.fit, point=point, linear=linear, robust=robust), settled=True)
 
 
 def _scaled(score: Score, share: float) -> Floats:
