@@ -22,7 +22,6 @@ from compass_ros.calibration.least_squares import (
     difference_steps,
     linearise,
     minimise,
-    move_between,
     normal_equations,
     start,
 )
@@ -48,12 +47,14 @@ ROBUST = 4.0
 CALM = 300.0
 """Movement of a frame by one prior width [sigma] above which it is trusted less; ordinary shots stay below."""
 
-SETTLING = 8
-"""Most steps of the end."""
+SETTLING = 6
+"""How often differences are taken at the end, at most."""
+SERVE = 8
+"""Steps that they serve, at most."""
 FINE = 0.03
 """Length of these differences, as a share of those that move the residual by one sigma."""
 SETTLED = 0.3
-"""Fall of the cost [log likelihood] by a step that is the last one."""
+"""Fall of the cost [log likelihood] by a step, or by all steps with the same differences, that is the last one."""
 UNEXPLAINED = 1.5
 """Mean squared residual above which exact values are of no use: something else differs."""
 _DAMPING = (1e-9, 1e-3, 1e-2, 1e-1, 1.0, 1e1)
@@ -158,31 +159,38 @@ def some(likelihood: Likelihood) -> Likelihood:
 
 
 def settled(likelihood: Likelihood, fit: Fit) -> Fit:
-    """The last steps to the optimum: Gauss-Newton with short central differences.
+    """The last steps to the optimum: Gauss-Newton with short central differences, which serve several steps.
 
     Along a valley that coupled parameters share, their effects cancel to a hundredth. Differences that are wrong by
     some per cent, as those of `minimise` are, end there, tens of log likelihood above the optimum.
     """
     free, robust, linear = fit.free, fit.robust, fit.linear
     point = replace(fit.point, cost=float(cost(likelihood, [fit.point], robust)[0][0]))
-    for step in range(SETTLING):
-        if step >= 2 and 2 * point.cost > UNEXPLAINED * likelihood.measurements:
+    for taken in range(SETTLING):
+        if taken >= 2 and 2 * point.cost > UNEXPLAINED * likelihood.measurements:
             break
         linear = central(likelihood, point, free, FINE * difference_steps(linear))
-        hessian, gradient = normal_equations(likelihood, point, linear, free, robust)
-        trials = [damped_step(likelihood, point, free, hessian, gradient, damping) for damping in _DAMPING]
-        move = move_between(likelihood, point, trials[0], free)
-        promised = -float(gradient @ move + 0.5 * move @ hessian @ move)
-        costs, residuals = cost(likelihood, trials, robust)
-        best = int(np.argmin(costs))
-        gained = point.cost - float(costs[best])
-        if gained <= 0:
-            break
-        point = replace(trials[best], cost=float(costs[best]))
-        linear = replace(linear, residual=residuals[best])
-        if min(promised, gained) < SETTLED:
+        before = point.cost
+        for _ in range(SERVE):
+            best, residual = _best_step(likelihood, point, linear, free, robust)
+            gained = point.cost - best.cost
+            if gained <= 0:
+                break
+            point, linear = best, replace(linear, residual=residual)
+            if gained < SETTLED:
+                break
+        if before - point.cost < SETTLED:
             break
     return replace(fit, point=point, linear=linear)
+
+
+def _best_step(likelihood: Likelihood, point: Point, linear: Linear, free: Ints, robust: float) -> tuple[Point, Floats]:
+    """The best of some damped steps, with its residual."""
+    hessian, gradient = normal_equations(likelihood, point, linear, free, robust)
+    trials = [damped_step(likelihood, point, free, hessian, gradient, damping) for damping in _DAMPING]
+    costs, residuals = cost(likelihood, trials, robust)
+    best = int(np.argmin(costs))
+    return replace(trials[best], cost=float(costs[best])), residuals[best]
 
 
 def covariance(likelihood: Likelihood, fit: Fit) -> Floats:

@@ -185,9 +185,13 @@ def choose(space: Space, scores: Sequence[Score], candidates: Sequence[Candidate
     choice = _weighed([], base, floor_of(space.likelihood, space.fit, base))
     rounds = _rounds(space, scores)
     for promising in rounds:
-        choice = _weighed(_fitted(promising, choice.singles, base, slight), base, choice.floor)
+        tried = [further(j, slight, 3) for j in promising]
+        choice = _weighed(sorted([*choice.singles, *tried], key=_worth), base, choice.floor)
+        clear = _clear(choice)
+        if not clear:
+            choice = _weighed(_compared(choice, slight), base, choice.floor)
         best, *others = choice.singles
-        promises = LEADS if promising is rounds[-1] else NEARLY
+        promises = LEADS if clear or promising is rounds[-1] else NEARLY
         if not choice.good(unseen) and choice.share(best) > promises:
             choice = _weighed([from_second_start(best), *others], base, choice.floor)
         if good := choice.good(unseen):
@@ -216,14 +220,21 @@ def _rounds(space: Space, scores: Sequence[Score]) -> list[list[Joint]]:
     return [part for part in (sketches[:TRIED], sketches[TRIED : 2 * TRIED]) if part]
 
 
-def _fitted(promising: Sequence[Joint], before: Sequence[Joint], base: float, slight: float) -> list[Joint]:
-    """Models with one effect, those of earlier rounds among them, the best first and converged."""
-    tried = sorted((further(j, slight, 4) for j in promising), key=_worth)
-    best = min(j.fit.point.cost for j in tried)
-    leaders = [further(j, slight, 5) if j.fit.point.cost < 0.5 * (base + best) else j for j in tried[:LEADERS]]
-    singles = sorted([*before, *leaders, *tried[LEADERS:]], key=_worth)
-    ended = [j if any(j is other for other in before[:2]) else converge(j, slight) for j in singles[:2]]
-    return sorted([*ended, *singles[2:]], key=_worth)
+def _clear(choice: Choice) -> bool:
+    """Whether one effect explains much and no other half as much."""
+    best, *others = _different(choice.singles)
+    share = choice.share(best)
+    return share > LEADS and all(choice.share(j) < 0.5 * share for j in others)
+
+
+def _compared(choice: Choice, slight: float) -> list[Joint]:
+    """The same models with the leading ones converged, the best first."""
+    best = choice.share(choice.singles[0])
+    leading = [j for j in choice.singles[:LEADERS] if choice.share(j) > 0.5 * best]
+    rest = [j for j in choice.singles if not any(j is other for other in leading)]
+    leading = sorted((j if j.converged else further(j, slight, 5) for j in leading), key=_worth)
+    ended = [j if j.converged else converge(j, slight) for j in leading[:2]]
+    return sorted([*ended, *leading[2:], *rest], key=_worth)
 
 
 def _weighed(singles: Sequence[Joint], base: float, floor: float) -> Choice:

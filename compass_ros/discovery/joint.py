@@ -37,6 +37,8 @@ class Joint:
     fit: Fit
     added: tuple[Attached, ...]
     """The effects of this fit."""
+    converged: bool = False
+    """With differences at the solution."""
     settled: bool = False
     """From two starts, and at its optimum."""
 
@@ -96,7 +98,7 @@ def converge(joint: Joint, slight: float, iterations: int = 8) -> Joint:
     fit = minimise(
         joint.likelihood, joint.fit.point, joint.fit.free, iterations, joint.fit.robust, tolerance, joint.fit.linear
     )
-    return replace(joint, fit=fit)
+    return replace(joint, fit=fit, converged=True)
 
 
 def from_second_start(joint: Joint) -> Joint:
@@ -114,10 +116,12 @@ def from_second_start(joint: Joint) -> Joint:
     second = refine(likelihood, values)
     reached = float(cost(likelihood, [second.fit.point], robust)[0][0])
     if reached > joint.fit.point.cost:
-        return replace(joint, fit=settled(likelihood, joint.fit), settled=True)
+        return replace(joint, fit=settled(likelihood, joint.fit), converged=True, settled=True)
     linear = scaled(second.fit.linear, second.likelihood, likelihood)
     point = replace(second.fit.point, cost=reached)
-    return replace(joint, fit=replace(second.fit, point=point, linear=linear, robust=robust), settled=True)
+    return replace(
+        joint, fit=replace(second.fit, point=point, linear=linear, robust=robust), converged=True, settled=True
+    )
 
 
 def _scaled(score: Score, share: float) -> Floats:
