@@ -20,6 +20,7 @@ from compass_ros.calibration.refine import Refined, fitted_launches, refine
 from compass_ros.cells import Cell
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery, discover, not_evaluated
+from compass_ros.discovery.unseen import unexpected
 from compass_ros.errors import DataError
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.factors import factor_distance
@@ -48,22 +49,31 @@ def calibrate(
     The same episodes, cell and configuration give the same result, bit for bit. Wall time is for the caller to add.
     """
     used = evenly(episodes, config.episodes)
-    fit, held_out = split(used, config)
     simulator = Simulator(cell, threads=config.threads)
-    data, judge = recordings(cell, fit), recordings(cell, held_out or fit)
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
-    problem = pose(simulator, data, noise)
+    told = []
+    for turn in range(2):
+        fit, held_out = split(used, config, turn)
+        data, judge = recordings(cell, fit), recordings(cell, held_out or fit)
+        noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
+        problem, unseen = pose(simulator, data, noise), pose(simulator, judge, noise).likelihood
 
-    estimate, refined = estimate_parameters(problem, config, report)
-    found = not_evaluated("it was switched off")
-    if config.discover:
+        estimate, refined = estimate_parameters(problem, config, report)
+        if not config.discover:
+            found = not_evaluated("it was switched off")
+            break
         refined = refined or refine(problem.likelihood, estimate.values)
-        found = discover(simulator, refined, pose(simulator, judge, noise).likelihood, noise, config.seed, report)
+        if turn or len(used) < 2 * len(held_out) or not (held_out and unexpected(unseen, refined)):
+            found = discover(simulator, refined, unseen, noise, config.seed, report)
+            break
+        told.append(
+            f"what fits the other episodes to the noise does not predict {', '.join(judge.names)}: these are fitted, "
+            "others are held out"
+        )
     result = assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, found)
     if len(used) < len(episodes):
         said = f"{len(used)} of {len(episodes)} episodes were used, evenly over the order of recording"
-        result = replace(result, warnings=(f"{said}; the option `episodes` takes more", *result.warnings))
-    return result, found
+        told.append(f"{said}; the option `episodes` takes more")
+    return replace(result, warnings=(*told, *result.warnings)), found
 
 
 def evenly(episodes: Sequence[Episode], most: int) -> list[Episode]:
@@ -77,8 +87,11 @@ def evenly(episodes: Sequence[Episode], most: int) -> list[Episode]:
     return [ordered[i] for i in np.round(np.linspace(0, len(ordered) - 1, most)).astype(int)]
 
 
-def split(episodes: Sequence[Episode], config: CalibrationConfig) -> tuple[list[Episode], list[Episode]]:
-    """Episodes to fit and episodes that are never fitted; the choice depends on names and seed alone."""
+def split(episodes: Sequence[Episode], config: CalibrationConfig, turn: int = 0) -> tuple[list[Episode], list[Episode]]:
+    """Episodes to fit and episodes that are never fitted; the choice depends on names and seed alone.
+
+    At the next `turn` others are held out.
+    """
     if not episodes:
         raise DataError("no episodes: nothing to calibrate with")
 
@@ -86,7 +99,7 @@ def split(episodes: Sequence[Episode], config: CalibrationConfig) -> tuple[list[
         return hashlib.sha256(f"{config.seed}/{episode.name}".encode()).hexdigest()
 
     count = round(config.held_out_share * len(episodes)) if len(episodes) > 1 else 0
-    chosen = {e.name for e in sorted(episodes, key=rank)[:count]}
+    chosen = {e.name for e in sorted(episodes, key=rank)[turn * count : (turn + 1) * count]}
     ordered = sorted(episodes, key=lambda e: (e.name, e.start_ns))
     return [e for e in ordered if e.name not in chosen], [e for e in ordered if e.name in chosen]
 

@@ -7,7 +7,7 @@ trajectories most, and frees the others, down to those that the recordings can j
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -114,20 +114,26 @@ class Refined:
 
 def refine(likelihood: Likelihood, values: Floats, watch: Watch = lambda *_: True) -> Refined:
     """Fit from the given (P,) values."""
+    for stage, (_, fit) in enumerate(growing(likelihood, values), 1):
+        if not watch("refine", 0.7 * stage / len(HORIZONS), fit.point):
+            return polish(likelihood, fit.point, watch)
+    return polish(calmed(likelihood, fit.linear), fit.point, watch)
+
+
+def growing(likelihood: Likelihood, values: Floats) -> Iterator[tuple[Likelihood, Fit]]:
+    """The beginning of each episode and the fit of the strongest parameters to it, longer from one to the next."""
     point = start(likelihood, values)
     few = some(likelihood)
     first, share_asked = sensitivity(few, start(few, values)), len(few.inputs) / len(likelihood.inputs)
     strong, steps = first.felt(STRONG * np.sqrt(share_asked), STRONG_SHARE), first.steps.copy()
-    for i, share in enumerate(HORIZONS):
+    for share in HORIZONS:
         part = likelihood.until(share * float(likelihood.time_s.max()))
         robust = max(ROBUST, 3.0 * typical_residual(part, point))
         last = share == HORIZONS[-1]
         tolerance = 1.0 if last else 5.0
         fit = minimise(part, point, strong, 4, robust, tolerance, steps=steps[strong], fresh=last)
         point, steps[strong] = fit.point, difference_steps(fit.linear)
-        if not watch("refine", 0.7 * (i + 1) / len(HORIZONS), point):
-            return polish(likelihood, point, watch)
-    return polish(calmed(likelihood, fit.linear), point, watch)
+        yield part, fit
 
 
 def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True) -> Refined:

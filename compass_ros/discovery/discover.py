@@ -11,10 +11,10 @@ from compass_ros.calibration.least_squares import Point, minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import Refined, polish
-from compass_ros.discovery.candidates import Candidate, candidates
-from compass_ros.discovery.choose import Choice, choose, held_out
+from compass_ros.discovery.beginning import from_the_beginning
+from compass_ros.discovery.candidates import candidates
+from compass_ros.discovery.choose import Choice, choose
 from compass_ros.discovery.finding import Discovery, Finding, not_evaluated
-from compass_ros.discovery.impulses import impulses
 from compass_ros.discovery.information import information
 from compass_ros.discovery.maps import residual_map
 from compass_ros.discovery.null import Null, simulate_null
@@ -22,7 +22,8 @@ from compass_ros.discovery.numerics import numerical_cause
 from compass_ros.discovery.plan import objections, plan_of
 from compass_ros.discovery.remainder import smooth_excess
 from compass_ros.discovery.screen import Score, Space
-from compass_ros.discovery.tangents import score
+from compass_ros.discovery.tangents import screen
+from compass_ros.discovery.unseen import held_out
 from compass_ros.errors import DataError
 from compass_ros.simulation import Simulator
 from compass_ros.types import Mismatch, Progress, Report
@@ -57,7 +58,7 @@ def discover(
 
     tell("screen effects", 0.0)
     asked = candidates(simulator)
-    space, scores = _screen(simulator, refined, asked)
+    space, scores = screen(simulator, refined, asked)
     null = simulate_null(space, scores, noise, seed)
     undetectable = plan_of(information(space, asked)).undetectable
     before = residual_map(space)
@@ -70,15 +71,15 @@ def discover(
     if cause:
         return found.failed(f"No verdict: {cause}. That is the simulator's numerics, not physics.")
     tell("fit effects", 0.4)
-    unseen = held_out(judge, space)
-    choice = choose(space, scores, asked, unseen)
+    unseen = held_out(judge, space.likelihood, space.fit)
+    choice = choose(space, scores, asked, unseen, from_the_beginning(simulator, refined, asked))
     again = _restarted(refined, choice, simulator)
     if again is not None:  # the plain simulator does better than it was thought to: begin again from there
-        space, scores = _screen(simulator, again, asked)
+        space, scores = screen(simulator, again, asked)
         found = replace(found, space=space, refined=again, null=simulate_null(space, scores, noise, seed))
         if not _something(space, scores, found.null, noise):
             return found.none(scores)
-        unseen = held_out(judge, space)
+        unseen = held_out(judge, space.likelihood, space.fit)
         choice = choose(space, scores, asked, unseen)
     tell("weigh effects", 0.9)
     return found.judged(choice, unseen)
@@ -91,12 +92,6 @@ def _lacking(simulator: Simulator, episodes: int) -> str:
     if not simulator.movers():
         return "effects act on bodies that slide in the plane and on joints; none is tracked in this cell"
     return ""
-
-
-def _screen(simulator: Simulator, refined: Refined, asked: Sequence[Candidate]) -> tuple[Space, list[Score]]:
-    space = Space(simulator, refined.likelihood, refined.fit, impulses(simulator, refined.likelihood, refined.fit))
-    scores = [score(space, candidate) for candidate in asked]
-    return space, sorted(scores, key=lambda s: -s.gain)
 
 
 def _something(space: Space, scores: Sequence[Score], null: Null, noise: Noise) -> bool:

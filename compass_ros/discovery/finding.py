@@ -10,7 +10,7 @@ import numpy as np
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import Refined, covariance
-from compass_ros.discovery.choose import Choice, HeldOut
+from compass_ros.discovery.choose import Choice
 from compass_ros.discovery.formula import Proposal, propose
 from compass_ros.discovery.joint import Joint, from_second_start
 from compass_ros.discovery.maps import TableMap, residual_map
@@ -19,6 +19,7 @@ from compass_ros.discovery.null import Null
 from compass_ros.discovery.numerics import shift
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.unknown import whereabouts
+from compass_ros.discovery.unseen import HeldOut
 from compass_ros.discovery.words import errors, place, value_of, where_of
 from compass_ros.simulation import Simulator
 from compass_ros.types import EffectFinding, EffectParameter, Evidence, Floats, Mismatch, Verdict

@@ -109,19 +109,29 @@ def from_second_start(joint: Joint) -> Joint:
     """
     if joint.settled:
         return joint
-    likelihood, robust = joint.likelihood, joint.fit.robust
-    values = likelihood.prior_mean.copy()
+    values = joint.likelihood.prior_mean.copy()
     of_effects = np.arange(len(joint.simulator.cell.parameters), len(values))
     values[of_effects] = joint.fit.point.values[of_effects]
-    second = refine(likelihood, values)
-    reached = float(cost(likelihood, [second.fit.point], robust)[0][0])
-    if reached > joint.fit.point.cost:
-        return replace(joint, fit=settled(likelihood, joint.fit), converged=True, settled=True)
-    linear = scaled(second.fit.linear, second.likelihood, likelihood)
-    point = replace(second.fit.point, cost=reached)
-    return replace(
-        joint, fit=replace(second.fit, point=point, linear=linear, robust=robust), converged=True, settled=True
-    )
+    second = _refined(joint.simulator, joint.likelihood, joint.added, values, joint.fit.robust)
+    if second.fit.point.cost > joint.fit.point.cost:
+        return replace(joint, fit=settled(joint.likelihood, joint.fit), converged=True, settled=True)
+    return second
+
+
+def grown(joint: Joint, simulator: Simulator, likelihood: Likelihood, robust: float) -> Joint:
+    """A fit to the beginning of episodes, grown to the whole of them: simulator and likelihood without the effects."""
+    wider, whole = widened(simulator, likelihood, joint.added)
+    return _refined(wider, whole, joint.added, joint.fit.point.values, robust)
+
+
+def _refined(
+    simulator: Simulator, likelihood: Likelihood, added: tuple[Attached, ...], values: Floats, robust: float
+) -> Joint:
+    """A fit on a growing horizon, in the weights of `likelihood` and not in those that it ends with."""
+    end = refine(likelihood, values)
+    point = replace(end.fit.point, cost=float(cost(likelihood, [end.fit.point], robust)[0][0]))
+    fit = replace(end.fit, point=point, linear=scaled(end.fit.linear, end.likelihood, likelihood), robust=robust)
+    return Joint(simulator, likelihood, fit, added, converged=True, settled=True)
 
 
 def _scaled(score: Score, share: float) -> Floats:

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from compass_ros.calibration.refine import Refined
 from compass_ros.discovery.candidates import Candidate
+from compass_ros.discovery.impulses import impulses
 from compass_ros.discovery.screen import Score, Space, score_force, solve
+from compass_ros.simulation import Simulator
 from compass_ros.types import Floats
+
+
+def screen(simulator: Simulator, refined: Refined, asked: Sequence[Candidate]) -> tuple[Space, list[Score]]:
+    """All candidates to first order at a fit, the most promising first."""
+    space = Space(simulator, refined.likelihood, refined.fit, impulses(simulator, refined.likelihood, refined.fit))
+    return space, sorted((score(space, candidate) for candidate in asked), key=lambda s: -s.gain)
 
 
 def score(space: Space, candidate: Candidate) -> Score:

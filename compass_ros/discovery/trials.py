@@ -1,0 +1,65 @@
+"""Fits of candidates, cheap ones first: what two steps from the plain fit come to, and where that leads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from compass_ros.calibration.least_squares import minimise
+from compass_ros.discovery.joint import Joint, fit_jointly
+from compass_ros.discovery.screen import Score, Space
+
+ASKED = 12
+"""Names whose fit is sketched, the most promising first."""
+SKETCHED = 2
+"""Steps of a sketch."""
+TRIED = 5
+"""Sketches that are fitted at once, the best first; as many again where none of them is enough."""
+PROMISING = 0.1
+"""Least first-order gain, as a share of the best, to be tried."""
+
+
+def sketched(space: Space, scores: Sequence[Score]) -> list[Joint]:
+    """Sketches of the fits of promising candidates, the best first.
+
+    What the simulator says of two cheap steps orders candidates better than their first-order gain does.
+    """
+    return sorted((fit_jointly(space, [s], SKETCHED, anew=False) for s in _promising(scores)), key=worth)
+
+
+def further(joint: Joint, slight: float, iterations: int) -> Joint:
+    """A promising fit, continued while a step gains more than is `slight` [log likelihood]."""
+    fit, tolerance = joint.fit, max(1.0, slight)
+    fit = minimise(joint.likelihood, fit.point, fit.free, iterations, fit.robust, tolerance, fit.linear, fresh=False)
+    return replace(joint, fit=fit)
+
+
+def worth(joint: Joint) -> float:
+    """Order of models: what they leave, and what their numbers cost (Laplace); smaller is better."""
+    return -joint.log_evidence(joint.likelihood.correlation_time)
+
+
+def different(singles: Sequence[Joint]) -> list[Joint]:
+    """The best fit of each name."""
+    seen: dict[str, Joint] = {}
+    for joint in singles:
+        seen.setdefault(joint.name, joint)
+    return list(seen.values())
+
+
+def _promising(scores: Sequence[Score]) -> list[Score]:
+    """The best objects of each name, and all objects together where that is almost as good."""
+    best: dict[str, list[Score]] = {}
+    for s in sorted(scores, key=lambda s: -s.gain):
+        best.setdefault(s.candidate.name, []).append(s)
+    top = max((s[0].gain for s in best.values()), default=0.0)
+    names = sorted(best.values(), key=lambda group: -group[0].gain)[:ASKED]
+    out = []
+    for group in names:
+        if group[0].gain < max(PROMISING * top, 1e-9):
+            continue
+        out.append(group[0])
+        together = max(group, key=lambda s: len(s.candidate.attached.objects))
+        if together is not group[0] and together.gain > 0.6 * group[0].gain:
+            out.append(together)
+    return out

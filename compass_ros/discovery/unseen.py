@@ -1,0 +1,104 @@
+"""Episodes that were never fitted: how surprising they are to a fitted model, beside what noise alone would be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compass_ros.calibration.least_squares import (
+    Fit,
+    Point,
+    difference_steps,
+    linearise,
+    robust_loss,
+    robust_weight,
+)
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.refine import ROBUST, Refined, calmed, covariance
+from compass_ros.discovery.joint import Joint
+
+HELD_OUT_SHARE = 0.4
+"""Share of the held-out excess that a model must remove where there is one."""
+HELD_OUT_SEEN = 15.0
+"""Held-out excess [log likelihood] from which it can be judged at all."""
+FLOOR = 1.2
+"""Chi-square of a fit that leaves nothing to find in the episodes it was fitted to."""
+UNEXPECTED = 0.1
+"""Surprise beyond that of fitted episodes, a measurement [log likelihood]; under 0.04 where nothing is missing."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Episodes that were never fitted, weighted as the fitted ones are."""
+
+    likelihood: Likelihood
+    before: float
+    """Surprise by the model without effects."""
+    floor: float
+    """Surprise by noise alone."""
+
+    def surprise(self, joint: Joint) -> float:
+        """Minus the log predictive density of a fitted model."""
+        return surprise(self.likelihood, joint.likelihood, joint.fit)
+
+    def helps(self, joint: Joint) -> bool:
+        """Whether a model predicts these episodes better: clearly, where there is something to gain."""
+        excess, gain = self.before - self.floor, self.before - self.surprise(joint)
+        return gain > HELD_OUT_SHARE * excess if excess > HELD_OUT_SEEN else gain > -5.0
+
+
+def unexpected(judge: Likelihood, refined: Refined) -> bool:
+    """Whether a fit that reaches the noise floor fails on episodes that it has not seen.
+
+    Then those fitted do not show what is missing: parameters may stand for it in a few episodes, and not in others.
+    """
+    if refined.chi_square > FLOOR:
+        return False
+    fitted, fit = refined.likelihood, refined.fit
+    usual = (fit.point.cost + 0.5 * len(fit.free)) / fitted.measurements  # outliers included
+    return held_out(judge, fitted, fit).before > (usual + UNEXPECTED) * judge.measurements
+
+
+def held_out(judge: Likelihood, fitted: Likelihood, fit: Fit) -> HeldOut:
+    """Weigh held-out episodes: frames that the parameters move too much are trusted less, as in the fit."""
+    point = Point(fit.point.values, np.zeros_like(judge.inputs), np.inf)
+    linear = linearise(judge, point, fit.free, difference_steps(fit.linear))
+    calm = calmed(judge, linear)
+    floor = noise_cost(calm, replace(fit, free=np.zeros(0, dtype=np.int64)))
+    return HeldOut(calm, surprise(calm, fitted, fit), floor)
+
+
+def surprise(unseen: Likelihood, fitted: Likelihood, fit: Fit) -> float:
+    """Minus the log predictive density of unseen episodes, up to a constant: noise and the fit's own uncertainty.
+
+    A model that is unsure what its parameters are may be wrong about an episode without being refuted by it: the
+    residual has the covariance 1 + J C J', C that of the fitted parameters. Outliers are weighed down as in the fit.
+    """
+    judged = fitted.on(unseen)
+    point = Point(fit.point.values, np.zeros_like(unseen.inputs), np.inf)
+    linear = linearise(judged, point, fit.free, difference_steps(fit.linear))
+    residual, jacobian = linear.residual.ravel(), linear.jacobian.reshape(-1, len(fit.free))
+    known = covariance(fitted, fit)[: len(fit.free), : len(fit.free)]
+    precision = np.linalg.inv(known)
+    left, weight = residual, np.ones_like(residual)
+    for _ in range(3):
+        weight = robust_weight(left, ROBUST)
+        inner = precision + (jacobian * weight[:, None]).T @ jacobian
+        move = -np.linalg.solve(inner, jacobian.T @ (weight * residual))
+        left = residual + jacobian @ move
+    loss = 0.5 * float(np.sum(robust_loss(left, ROBUST)))
+    volume = np.linalg.slogdet(inner)[1] - np.linalg.slogdet(precision)[1]
+    return loss + 0.5 * float(move @ precision @ move) + 0.5 * float(volume)
+
+
+def noise_cost(likelihood: Likelihood, fit: Fit) -> float:
+    """Cost that unit normal noise leaves under the robust loss, less what the free parameters take."""
+    grid = np.linspace(-6, 6, 2001)
+    density = np.exp(-0.5 * grid**2) / np.sqrt(2 * np.pi)
+    loss = 0.5 * robust_loss(grid, fit.robust)
+    noise = likelihood.sigma.min(axis=(0, 1))  # before any collision there is nothing but the tracker's noise
+    quiet = noise**2 / likelihood.sigma**2  # where sigma holds more than noise, noise is quieter than one sigma
+    of_noise = float(np.sum(density * loss) * (grid[1] - grid[0]))
+    measured = ~np.isnan(likelihood.measured)
+    return of_noise * float(np.sum(np.broadcast_to(quiet, measured.shape)[measured])) - 0.5 * len(fit.free)
