@@ -1,4 +1,4 @@
-"""Effects screened on the beginning of the episodes, where the plain simulator has only begun to fail.
+"""Effects tried on the beginning of the episodes, where the plain simulator has only begun to fail.
 
 What is missing bends a trajectory a little at first; some collisions later a fit without it is somewhere else, and what
 a first-order argument says there means nothing. The beginning names candidates and their sizes; the fit of each then
@@ -8,49 +8,92 @@ grows with the horizon, its effect inside from the start.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from compass_ros.calibration.least_squares import Fit, Point, minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import Refined, growing, polish
 from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.joint import Joint, grown
+from compass_ros.discovery.joint import Joint, grown, widened
 from compass_ros.discovery.tangents import screen
-from compass_ros.discovery.trials import TRIED, different, further, sketched, worth
+from compass_ros.discovery.trials import TRIED, different, further, sketched
 from compass_ros.simulation import Simulator
 
 POOR = 4.0
 """Mean squared residual of a plain fit from which nothing near it is of use."""
-BEGUN = 1.3
-"""Mean squared residual, over the noise's, at which a simulator has begun to fail."""
+BEGUN = 1.1
+"""Mean squared residual at which a simulator has begun to fail."""
 SLIGHT = 2.0
 """Log likelihood that a further step of these first fits must promise."""
 FEW = 2
 """Candidates that are followed to the end."""
 
 
-def from_the_beginning(simulator: Simulator, refined: Refined, asked: Sequence[Candidate]) -> Iterator[Joint]:
-    """Models of one effect that explain the beginning, each fitted to the whole episodes; none for a fair fit."""
+@dataclass(frozen=True)
+class Beginning:
+    """The shortest part of the episodes that the plain simulator does not follow."""
+
+    followed: Fit
+    """Of its strongest parameters to the part before."""
+    failed: Refined
+    """The best plain fit there."""
+
+
+def from_the_beginning(simulator: Simulator, refined: Refined, asked: Sequence[Candidate]) -> Iterator[list[Joint]]:
+    """Effects that explain the beginning, each fitted to the whole episodes; none for a fair fit.
+
+    An effect is there on the objects that the beginning tells, which not all may have moved by then, and on all.
+    """
     likelihood, fit = refined.likelihood, refined.fit
     if 2 * fit.point.cost < POOR * likelihood.measurements:
         return
-    failed = _where_it_fails(likelihood)
-    if failed is None:
+    beginning = _where_it_fails(likelihood)
+    if beginning is None:
         return
-    space, scores = screen(simulator, failed, asked)
-    tried = sorted((further(j, SLIGHT, 4) for j in sketched(space, scores)[:TRIED]), key=worth)
+    space, scores = screen(simulator, beginning.failed, [c for c in asked if c.by_force])
+    begun = sorted((_begun(simulator, beginning, c) for c in asked if not c.by_force), key=_cost)
+    promising = [*sketched(space, scores)[:TRIED], *(_freed(j, beginning) for j in different(begun)[:FEW])]
+    tried = sorted((further(j, SLIGHT, 4) for j in promising), key=_cost)
     for joint in different(tried)[:FEW]:
-        yield grown(joint, simulator, likelihood, fit.robust)
+        all_objects = next(c.attached for c in asked if c.name == joint.name)
+        sets = dict.fromkeys((joint.added[0], all_objects if all_objects.effect.on == "objects" else joint.added[0]))
+        yield [grown(joint, attached, simulator, likelihood, fit.robust) for attached in sets]
 
 
-def _where_it_fails(likelihood: Likelihood) -> Refined | None:
-    """The plain fit to the shortest beginning that it does not explain; None where it explains all of them."""
+def _cost(joint: Joint) -> float:
+    return joint.fit.point.cost
+
+
+def _where_it_fails(likelihood: Likelihood) -> Beginning | None:
+    """None where the plain simulator follows all of the episodes."""
     noise = np.broadcast_to(likelihood.sigma.min(axis=(0, 1)), likelihood.sigma.shape)
-    plain = replace(likelihood, sigma=noise.copy())
-    for part, fit in growing(plain, likelihood.prior_mean):
+    followed: Fit | None = None
+    for part, fit in growing(replace(likelihood, sigma=noise.copy()), likelihood.prior_mean):
         if 2 * fit.point.cost > BEGUN * part.measurements:
-            there = polish(part, fit.point)
-            if there.chi_square > BEGUN:
-                return there
+            failed = polish(part, fit.point)
+            if 2 * failed.fit.point.cost > BEGUN * part.measurements:
+                return Beginning(followed or fit, failed)
+        followed = fit
     return None
+
+
+def _begun(simulator: Simulator, beginning: Beginning, candidate: Candidate) -> Joint:
+    """A candidate of which first order says little (contacts, commands, sensors), fitted from where all was well."""
+    added = (candidate.attached,)
+    wider, likelihood = widened(simulator, beginning.failed.likelihood, added)
+    point, free = beginning.followed.point, beginning.followed.free
+    effect = np.arange(len(point.values), len(likelihood.prior_mean))
+    start = Point(np.concatenate([point.values, likelihood.prior_mean[effect]]), point.launch, np.inf)
+    robust = beginning.failed.fit.robust
+    fit = minimise(likelihood, start, np.concatenate([free, effect]), 5, robust, SLIGHT, fresh=False)
+    return Joint(wider, likelihood, fit, added)
+
+
+def _freed(joint: Joint, beginning: Beginning) -> Joint:
+    """With all parameters that are felt there, not the strongest alone."""
+    plain, fit = beginning.failed.fit.free, joint.fit
+    effect = np.arange(len(beginning.failed.fit.point.values), len(fit.point.values))
+    free = np.concatenate([plain, effect])
+    return replace(joint, fit=minimise(joint.likelihood, fit.point, free, 1, fit.robust, SLIGHT, fresh=False))

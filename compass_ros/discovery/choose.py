@@ -96,17 +96,21 @@ def floor_of(likelihood: Likelihood, fit: Fit, reached: float) -> float:
 
 
 def choose(
-    space: Space, scores: Sequence[Score], candidates: Sequence[Candidate], unseen: HeldOut, early: Iterable[Joint] = ()
+    space: Space,
+    scores: Sequence[Score],
+    candidates: Sequence[Candidate],
+    unseen: HeldOut,
+    early: Iterable[list[Joint]] = (),
 ) -> Choice:
     """Fit the promising candidates; where none is enough, others, and then the best of them with a second one.
 
-    `early`: models that the beginnings of the episodes suggest; tried first.
+    `early`: models that the beginnings of the episodes suggest, some at a time; tried first.
     """
     base = float(cost(space.likelihood, [space.fit.point], space.fit.robust)[0][0])
     slight = SLIGHT * (base - floor_of(space.likelihood, space.fit, base))
     choice = _weighed([], base, floor_of(space.likelihood, space.fit, base))
-    for joint in early:
-        choice = _weighed(sorted([joint, *choice.singles], key=worth), base, choice.floor)
+    for grown in early:
+        choice = _weighed(sorted([*grown, *choice.singles], key=worth), base, choice.floor)
         if choice.good(unseen):
             return _concluded(choice, candidates, unseen)
     sketches = sketched(space, scores)

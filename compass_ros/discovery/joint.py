@@ -118,10 +118,13 @@ def from_second_start(joint: Joint) -> Joint:
     return second
 
 
-def grown(joint: Joint, simulator: Simulator, likelihood: Likelihood, robust: float) -> Joint:
-    """A fit to the beginning of episodes, grown to the whole of them: simulator and likelihood without the effects."""
-    wider, whole = widened(simulator, likelihood, joint.added)
-    return _refined(wider, whole, joint.added, joint.fit.point.values, robust)
+def grown(joint: Joint, attached: Attached, simulator: Simulator, likelihood: Likelihood, robust: float) -> Joint:
+    """A fit of one effect to the beginning of episodes, grown to the whole of them, perhaps on other objects.
+
+    Simulator and likelihood are those without the effect.
+    """
+    wider, whole = widened(simulator, likelihood, (attached,))
+    return _refined(wider, whole, (attached,), joint.fit.point.values, robust)
 
 
 def _refined(

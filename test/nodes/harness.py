@@ -163,6 +163,14 @@ class Probe:
         assert client.wait_for_server(timeout_s), f"no action {name}"
         return client
 
+    def ask(self, request: Callable[..., Future], *words: Any, timeout_s: float = 10) -> Any:
+        """The answer to a request of an action's client, made by the thread that spins.
+
+        From another thread, an answer can arrive before rclpy has noted the request, which it then drops.
+        """
+        asked = self._executor.create_task(request, *words)
+        return self.result(self.result(asked), timeout_s)
+
     def result(self, future: Future, timeout_s: float = 10) -> Any:
         """What a future holds, once it does."""
         until(future.done, timeout_s, "an answer")

@@ -99,7 +99,7 @@ def test_feedback_a_second_one_refused_and_cancel_within_a_second(
     action = probe.action(Calibrate, "/calibrator/calibrate")
     feedback: list[Any] = []
     goal = Calibrate.Goal(bags=[str(bags)], cell="air_hockey", seed=2)
-    handle = probe.result(action.send_goal_async(goal, feedback_callback=feedback.append))
+    handle = probe.ask(action.send_goal_async, goal, feedback.append)
     assert handle.accepted
     until(lambda: any(one.feedback.share_done > 0 for one in feedback), 60, "feedback with some share done")
     newest = feedback[-1].feedback
@@ -113,13 +113,13 @@ def test_feedback_a_second_one_refused_and_cancel_within_a_second(
     assert time.monotonic() - begin < 0.5
     assert not refused.success
     assert refused.message.startswith("refused: a calibration is already running")
-    second = probe.result(probe.result(action.send_goal_async(goal)).get_result_async())
+    second = probe.ask(probe.ask(action.send_goal_async, goal).get_result_async)
     assert second.status == GoalStatus.STATUS_ABORTED
     assert second.result.message.startswith("refused: a calibration is already running")
 
     begin = time.monotonic()
     answer = handle.get_result_async()
-    probe.result(handle.cancel_goal_async())
+    probe.ask(handle.cancel_goal_async)
     cancelled = probe.result(answer)
     assert time.monotonic() - begin < 1
     assert cancelled.status == GoalStatus.STATUS_CANCELED
@@ -139,7 +139,7 @@ def test_bad_input_is_one_line_and_the_node_goes_on(tmp_path: Path, start_node: 
         (Calibrate.Goal(bags=["/no/such/bag"], cell="air_hokey"), ["air_hokey", "air_hockey"]),
         (Calibrate.Goal(bags=["/no/such/bag"], output=str(tmp_path)), [str(tmp_path), "not overwritten"]),
     ):
-        answer = probe.result(probe.result(action.send_goal_async(goal)).get_result_async(), 30)
+        answer = probe.ask(probe.ask(action.send_goal_async, goal).get_result_async, timeout_s=30)
         assert answer.status == GoalStatus.STATUS_ABORTED
         message = answer.result.message
         assert all(word in message for word in words), message

@@ -153,7 +153,7 @@ def test_hostile_goals_are_refused_in_one_line(start_node: StartNode, probe: Pro
         (Calibrate.Goal(bags=["/b"], cell="$(touch /tmp/owned)"), "touch"),
         (Calibrate.Goal(bags=["/b"], seed=2**64 - 1), "/b"),
     ):
-        answer = probe.result(probe.result(action.send_goal_async(goal)).get_result_async(), 30).result
+        answer = probe.ask(probe.ask(action.send_goal_async, goal).get_result_async, timeout_s=30).result
         assert not answer.success
         assert words in answer.message, answer.message
         assert "\n" not in answer.message
