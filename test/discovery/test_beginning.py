@@ -1,0 +1,33 @@
+"""An effect that a plain fit cannot follow is found where that begins to fail; a fair fit asks for nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from compass_ros.calibration.refine import refine
+from compass_ros.discovery.beginning import POOR, from_the_beginning
+from compass_ros.discovery.candidates import candidates
+from compass_ros.simulation.effects import EFFECTS, Attached
+from test.discovery.planted import CALM, HELD_OUT, PUCKS, recorded
+from test.simulation.table import simulator
+
+SHOTS = np.concatenate([CALM, HELD_OUT])
+ASKED = ("off_centre_mass", "tangential_impulse", "swirl", "camera_scale")
+
+
+def test_a_centre_of_mass_beside_the_centre() -> None:
+    effect = Attached(EFFECTS["off_centre_mass"], PUCKS)
+    likelihood = recorded(effect, [0.003, -0.002], SHOTS)
+    refined = refine(likelihood, simulator().defaults)
+    assert 2 * refined.fit.point.cost > POOR * likelihood.measurements, "else there is nothing to show"
+    asked = [c for c in candidates(simulator()) if c.name in ASKED]
+    found = next(from_the_beginning(simulator(), refined, asked))
+    best = min(found, key=lambda joint: joint.fit.point.cost)
+    assert best.added == (effect,)
+    assert best.fit.point.cost < 0.2 * refined.fit.point.cost
+    assert abs(best.fit.point.values[-2:] - [0.003, -0.002]).max() < 1e-4
+
+
+def test_a_fair_fit_asks_for_nothing() -> None:
+    refined = refine(recorded(None, []), simulator().defaults)
+    assert not list(from_the_beginning(simulator(), refined, candidates(simulator())))
