@@ -24,8 +24,9 @@ HELD_OUT_SEEN = 15.0
 """Held-out excess [log likelihood] from which it can be judged at all."""
 FLOOR = 1.2
 """Chi-square of a fit that leaves nothing to find in the episodes it was fitted to."""
-UNEXPECTED = 0.1
-"""Surprise beyond that of fitted episodes, a measurement [log likelihood]; under 0.04 where nothing is missing."""
+UNEXPECTED = 0.05
+"""Surprise beyond that of fitted episodes, a measurement [log likelihood]: three times its scatter (0.016, three episodes
+of 2.5 s at 60 Hz, eight tables) where nothing is missing. A false alarm costs a second fit and no more."""
 
 
 @dataclass(frozen=True)
