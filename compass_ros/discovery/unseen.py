@@ -25,8 +25,11 @@ HELD_OUT_SEEN = 15.0
 FLOOR = 1.2
 """Chi-square of a fit that leaves nothing to find in the episodes it was fitted to."""
 UNEXPECTED = 0.05
-"""Surprise beyond that of fitted episodes, a measurement [log likelihood]: three times its scatter (0.016, three episodes
-of 2.5 s at 60 Hz, eight tables) where nothing is missing. A false alarm costs a second fit and no more."""
+"""Surprise beyond that of fitted episodes, a measurement [log likelihood], that is doubted.
+
+Where nothing is missing it scatters by 0.016 (eight tables, three episodes of 2.5 s at 60 Hz). A false alarm costs a
+second fit and no more.
+"""
 
 
 @dataclass(frozen=True)
