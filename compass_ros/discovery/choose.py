@@ -31,6 +31,8 @@ EQUAL = 3.0
 """Log evidence within which two effects are told apart by nothing."""
 EQUAL_SHARE = 0.015
 """The same as a share of the excess: functional forms are never exactly right."""
+LITTLE, MANY_TIMES, SEVERAL = 0.12, 4.0, 2
+"""Share that an effect may leave where at least so many others, fitted as well, leave so many times as much."""
 NEEDED = 0.05
 """Share of the excess that an effect must be worth beside another that is enough."""
 FORM_LEFT = 0.25
@@ -87,7 +89,15 @@ class Choice:
         """Whether a model explains what there is to explain."""
         share = self.share(joint)
         form_only = share >= FORM_SHARE and self.remainder(joint) < SMALL
-        return share >= (ENOUGH if len(joint.added) == 1 else PAIR_ENOUGH) or form_only
+        return share >= (ENOUGH if len(joint.added) == 1 else PAIR_ENOUGH) or form_only or self._alone(joint)
+
+    def _alone(self, joint: Joint) -> bool:
+        """Whether an effect leaves little, and any other of several leaves many times that: its form is not ours."""
+        others = [j for j in different(self.singles) if j.name != joint.name]
+        left = 1 - self.share(joint)
+        if len(joint.added) > 1 or len(others) < SEVERAL or left > LITTLE:
+            return False
+        return all(1 - self.share(other) > MANY_TIMES * left for other in others)
 
 
 def floor_of(likelihood: Likelihood, fit: Fit, reached: float) -> float:
