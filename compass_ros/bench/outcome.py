@@ -91,7 +91,7 @@ def noise_floor(noise_m: float, world: World) -> float:
 
 def append(path: Path, row: Row) -> None:
     """Add one line; a torn last line of a killed run is closed first, so that it spoils only itself."""
-    text = json.dumps(row, allow_nan=False) + "\n"
+    text = json.dumps(row, allow_nan=False, separators=(",", ":")) + "\n"
     with path.open("ab+") as file:
         if file.tell() > 0:
             file.seek(-1, 2)

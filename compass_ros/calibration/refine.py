@@ -51,8 +51,9 @@ SETTLING = 6
 """How often differences are taken at the end, at most."""
 SERVE = 8
 """Steps that they serve, at most."""
-FINE = 0.03
-"""Length of these differences, as a share of those that move the residual by one sigma."""
+FINE = (0.1, 0.03)
+"""Lengths of these differences, in turn, as shares of those that move the residual by one sigma. The short ones are
+exact; the long ones see past what the simulator's steps at contacts do to a short one."""
 SETTLED = 0.3
 """Fall of the cost [log likelihood] by a step, or by all steps with the same differences, that is the last one."""
 UNEXPLAINED = 1.5
@@ -175,7 +176,7 @@ def settled(likelihood: Likelihood, fit: Fit) -> Fit:
     for taken in range(SETTLING):
         if taken >= 2 and 2 * point.cost > UNEXPLAINED * likelihood.measurements:
             break
-        linear = central(likelihood, point, free, FINE * difference_steps(linear))
+        linear = central(likelihood, point, free, FINE[taken % len(FINE)] * difference_steps(linear))
         before = point.cost
         for _ in range(SERVE):
             best, residual = _best_step(likelihood, point, linear, free, robust)
@@ -185,7 +186,7 @@ def settled(likelihood: Likelihood, fit: Fit) -> Fit:
             point, linear = best, replace(linear, residual=residual)
             if gained < SETTLED:
                 break
-        if before - point.cost < SETTLED:
+        if taken > 0 and before - point.cost < SETTLED:
             break
     return replace(fit, point=point, linear=linear)
 

@@ -52,7 +52,8 @@ def from_the_beginning(simulator: Simulator, refined: Refined, asked: Sequence[C
     beginning = _where_it_fails(likelihood)
     if beginning is None:
         return
-    space, scores = screen(simulator, beginning.failed, [c for c in asked if c.by_force])
+    failed = beginning.failed
+    space, scores = screen(simulator, failed.likelihood, failed.fit, [c for c in asked if c.by_force])
     begun = sorted((_begun(simulator, beginning, c) for c in asked if not c.by_force), key=_cost)
     promising = [*sketched(space, scores)[:TRIED], *(_freed(j, beginning) for j in different(begun)[:FEW])]
     tried = sorted((further(j, SLIGHT, 4) for j in promising), key=_cost)
@@ -93,7 +94,6 @@ def _begun(simulator: Simulator, beginning: Beginning, candidate: Candidate) -> 
 
 def _freed(joint: Joint, beginning: Beginning) -> Joint:
     """With all parameters that are felt there, not the strongest alone."""
-    plain, fit = beginning.failed.fit.free, joint.fit
-    effect = np.arange(len(beginning.failed.fit.point.values), len(fit.point.values))
-    free = np.concatenate([plain, effect])
+    failed, fit = beginning.failed.fit, joint.fit
+    free = np.concatenate([failed.free, np.arange(len(failed.point.values), len(fit.point.values))])
     return replace(joint, fit=minimise(joint.likelihood, fit.point, free, 1, fit.robust, SLIGHT, fresh=False))

@@ -11,11 +11,10 @@ from compass_ros.calibration.least_squares import (
 )
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.impulses import impulses
 from compass_ros.discovery.joint import Joint, converge, from_second_start
 from compass_ros.discovery.remainder import smooth_excess
 from compass_ros.discovery.screen import Score, Space
-from compass_ros.discovery.tangents import score
+from compass_ros.discovery.tangents import screen
 from compass_ros.discovery.trials import TRIED, different, further, sketched, worth
 from compass_ros.discovery.unseen import HELD_OUT_SEEN, HELD_OUT_SHARE, HeldOut
 
@@ -63,6 +62,16 @@ class Choice:
     """The first single is enough, and the pair still explains what it leaves: there are two."""
     equal: tuple[Joint, ...] = ()
     """Where the first single is enough: others that explain the recordings as well."""
+
+    def of(self, singles: Sequence[Joint]) -> Choice:
+        """The same recordings with these models; shares are of what the best shows to be above the noise."""
+        best = min(singles, key=lambda j: j.fit.point.cost)
+        return replace(self.shown_by(best), singles=tuple(singles))
+
+    def shown_by(self, joint: Joint) -> Choice:
+        """The same with the noise floor that a model shows."""
+        floor = floor_of(joint.likelihood, joint.fit, joint.fit.point.cost)
+        return replace(self, excess=self.excess + self.floor - floor, floor=floor)
 
     def share(self, joint: Joint) -> float:
         """Part of the excess that a model explains."""
@@ -117,24 +126,25 @@ def choose(
     `early`: models that the beginnings of the episodes suggest, some at a time; tried first.
     """
     base = float(cost(space.likelihood, [space.fit.point], space.fit.robust)[0][0])
-    slight = SLIGHT * (base - floor_of(space.likelihood, space.fit, base))
-    choice = _weighed([], base, floor_of(space.likelihood, space.fit, base))
+    floor = floor_of(space.likelihood, space.fit, base)
+    choice = Choice((), None, base - floor, floor)
+    slight = SLIGHT * choice.excess
     for grown in early:
-        choice = _weighed(sorted([*grown, *choice.singles], key=worth), base, choice.floor)
+        choice = choice.of(sorted([*grown, *choice.singles], key=worth))
         if choice.good(unseen):
             return _concluded(choice, candidates, unseen)
     sketches = sketched(space, scores)
     rounds = [part for part in (sketches[:TRIED], sketches[TRIED : 2 * TRIED]) if part]
     for promising in rounds:
         tried = [further(j, slight, 3) for j in promising]
-        choice = _weighed(sorted([*choice.singles, *tried], key=worth), base, choice.floor)
+        choice = choice.of(sorted([*choice.singles, *tried], key=worth))
         clear = _clear(choice)
         if not clear:
-            choice = _weighed(_compared(choice, slight), base, choice.floor)
+            choice = choice.of(_compared(choice, slight))
         best, *others = choice.singles
         promises = LEADS if clear or promising is rounds[-1] else NEARLY
         if not choice.good(unseen) and choice.share(best) > promises:
-            choice = _weighed([from_second_start(best), *others], base, choice.floor)
+            choice = choice.of([from_second_start(best), *others])
         if choice.good(unseen):
             return _concluded(choice, candidates, unseen)
     if not choice.singles:
@@ -143,8 +153,7 @@ def choose(
     firsts = [best] if choice.share(best) > LEADS else [best, *(converge(j, slight, 4) for j in others[:1])]
     pair = _second(firsts, candidates, slight)
     if pair and pair.fit.point.cost < min(j.fit.point.cost for j in choice.singles):
-        floor = floor_of(pair.likelihood, pair.fit, pair.fit.point.cost)
-        choice = replace(choice, excess=choice.excess + choice.floor - floor, floor=floor)
+        choice = choice.shown_by(pair)
     return replace(choice, pair=pair)
 
 
@@ -153,7 +162,7 @@ def _concluded(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOut)
     first = simplest(choice.good(unseen))
     equal = _equals(first, choice, unseen)
     others = [j for j in choice.singles if j is not first]
-    choice = _weighed([from_second_start(first), *others], choice.excess + choice.floor, choice.floor)
+    choice = choice.of([from_second_start(first), *others])
     return _with_second(replace(choice, equal=equal), candidates, unseen)
 
 
@@ -168,18 +177,10 @@ def _compared(choice: Choice, slight: float) -> list[Joint]:
     """The same models with the leading ones converged, the best first."""
     best = choice.share(choice.singles[0])
     leading = [j for j in choice.singles[:LEADERS] if choice.share(j) > 0.5 * best]
-    rest = [j for j in choice.singles if not any(j is other for other in leading)]
+    rest = [j for j in choice.singles if j not in leading]
     leading = sorted((j if j.converged else further(j, slight, 5) for j in leading), key=worth)
     ended = [j if j.converged else converge(j, slight) for j in leading[:2]]
     return sorted([*ended, *leading[2:], *rest], key=worth)
-
-
-def _weighed(singles: Sequence[Joint], base: float, floor: float) -> Choice:
-    """Shares are of what the best of them shows to be above the noise."""
-    if singles:
-        cheapest = min(singles, key=lambda j: j.fit.point.cost)
-        floor = floor_of(cheapest.likelihood, cheapest.fit, cheapest.fit.point.cost)
-    return Choice(tuple(singles), None, base - floor, floor)
 
 
 def _equals(best: Joint, choice: Choice, unseen: HeldOut) -> tuple[Joint, ...]:
@@ -211,8 +212,7 @@ def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOu
     pair = _second([first], candidates, SLIGHT * choice.excess)
     if pair is None:
         return choice
-    floor = floor_of(pair.likelihood, pair.fit, pair.fit.point.cost)
-    choice = replace(choice, pair=pair, floor=floor, excess=choice.excess + choice.floor - floor)
+    choice = replace(choice.shown_by(pair), pair=pair)
     needed = choice.share(pair) - choice.share(first) > NEEDED
     seen, rest = unseen.surprise(first) - unseen.surprise(pair), unseen.surprise(first) - unseen.floor
     predicts = seen > HELD_OUT_SHARE * rest if rest > HELD_OUT_SEEN else seen > -5.0
@@ -228,10 +228,9 @@ def _second(firsts: Sequence[Joint], candidates: Sequence[Candidate], slight: fl
     """Some fits of one effect, each with the candidates that promise most of what it leaves: the best pair."""
     found: list[Joint] = []
     for first in firsts:
-        pushes = impulses(first.simulator, first.likelihood, first.fit)
-        there = Space(first.simulator, first.likelihood, first.fit, pushes)
         own = {a.effect.name for a in first.added}
-        scores = [score(there, c) for c in candidates if c.name not in own]
+        others = [c for c in candidates if c.name not in own]
+        there, scores = screen(first.simulator, first.likelihood, first.fit, others)
         for sketch in sketched(there, scores)[:TRIED]:
             joint = further(sketch, slight, 4)
             found.append(Joint(joint.simulator, joint.likelihood, joint.fit, (*first.added, *joint.added)))

@@ -58,7 +58,7 @@ def discover(
 
     tell("screen effects", 0.0)
     asked = candidates(simulator)
-    space, scores = screen(simulator, refined, asked)
+    space, scores = screen(simulator, refined.likelihood, refined.fit, asked)
     null = simulate_null(space, scores, noise, seed)
     undetectable = plan_of(information(space, asked)).undetectable
     before = residual_map(space)
@@ -75,7 +75,7 @@ def discover(
     choice = choose(space, scores, asked, unseen, from_the_beginning(simulator, refined, asked))
     again = _restarted(refined, choice, simulator)
     if again is not None:  # the plain simulator does better than it was thought to: begin again from there
-        space, scores = screen(simulator, again, asked)
+        space, scores = screen(simulator, again.likelihood, again.fit, asked)
         found = replace(found, space=space, refined=again, null=simulate_null(space, scores, noise, seed))
         if not _something(space, scores, found.null, noise):
             return found.none(scores)

@@ -28,9 +28,9 @@ _SHARES = (0.0, 0.15, 0.4, 0.7, 1.0)
 """Parts of the first-order step that are tried as a start."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Joint:
-    """A fit of the cell's parameters together with effects."""
+    """A fit of the cell's parameters together with effects. Two are equal where they are the same object."""
 
     simulator: Simulator
     likelihood: Likelihood

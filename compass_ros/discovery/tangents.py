@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from compass_ros.calibration.refine import Refined
+from compass_ros.calibration.least_squares import Fit
+from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.impulses import impulses
 from compass_ros.discovery.screen import Score, Space, score_force, solve
@@ -14,9 +15,11 @@ from compass_ros.simulation import Simulator
 from compass_ros.types import Floats
 
 
-def screen(simulator: Simulator, refined: Refined, asked: Sequence[Candidate]) -> tuple[Space, list[Score]]:
+def screen(
+    simulator: Simulator, likelihood: Likelihood, fit: Fit, asked: Sequence[Candidate]
+) -> tuple[Space, list[Score]]:
     """All candidates to first order at a fit, the most promising first."""
-    space = Space(simulator, refined.likelihood, refined.fit, impulses(simulator, refined.likelihood, refined.fit))
+    space = Space(simulator, likelihood, fit, impulses(simulator, likelihood, fit))
     return space, sorted((score(space, candidate) for candidate in asked), key=lambda s: -s.gain)
 
 

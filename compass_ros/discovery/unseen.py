@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -41,10 +41,13 @@ class HeldOut:
     """Surprise by the model without effects."""
     floor: float
     """Surprise by noise alone."""
+    _asked: dict[Joint, float] = field(default_factory=dict, repr=False)
 
     def surprise(self, joint: Joint) -> float:
-        """Minus the log predictive density of a fitted model."""
-        return surprise(self.likelihood, joint.likelihood, joint.fit)
+        """Minus the log predictive density of a fitted model; rolled out once for each."""
+        if joint not in self._asked:
+            self._asked[joint] = surprise(self.likelihood, joint.likelihood, joint.fit)
+        return self._asked[joint]
 
     def helps(self, joint: Joint) -> bool:
         """Whether a model predicts these episodes better: clearly, where there is something to gain."""

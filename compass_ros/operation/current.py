@@ -11,7 +11,6 @@ import numpy as np
 from compass_ros.cells import Cell
 from compass_ros.cells.auto import with_auto
 from compass_ros.episodes import Source, default_sources, find_bags, read_episode
-from compass_ros.errors import ConfigError
 from compass_ros.reporting.result_json import read_result
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects.exported import read_effects
@@ -79,10 +78,7 @@ def current(cell: Cell, version: Path | None = None, threads: int = 0) -> Curren
         simulator = Simulator(cell, threads=threads)
         return Current(simulator, simulator.defaults)
     where = str(version / "result.json")
-    content = read_result(version / "result.json")
-    if content["cell"] != cell.name:
-        raise ConfigError(f"{version}: parameters of '{content['cell']}', this cell is '{cell.name}'")
-    rows = content["parameters"]
+    rows = read_result(version / "result.json", cell.name)["parameters"]
     own = {p.name for p in cell.parameters}
     if any(row["name"] not in own for row in rows):
         cell = with_auto(cell)  # calibrated with `--parameters auto`

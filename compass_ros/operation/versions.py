@@ -58,7 +58,7 @@ class Versions:
             ConfigError: No result there, one of another cell, cut short, or one whose verdict says that it means
                 nothing.
         """
-        content = read_result(result / _RESULT)
+        content = read_result(result / _RESULT, self.cell)
         self._check(content, result)
         stack = self._stack()
         number = max([0, *stack, *self._numbers()]) + 1
@@ -89,8 +89,6 @@ class Versions:
         return self.applied()
 
     def _check(self, content: Mapping[str, object], result: Path) -> None:
-        if content["cell"] != self.cell:
-            raise ConfigError(f"{result}: parameters of '{content['cell']}', this cell is '{self.cell}'")
         mismatch = content["mismatch"]
         verdict = mismatch["verdict"] if isinstance(mismatch, dict) else ""
         if content["cancelled"] or verdict in NOT_TO_BE_APPLIED:

@@ -139,8 +139,11 @@ def write_result(result: Result, path: Path) -> None:
     write_text(Path(path), json.dumps(to_json(result), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def read_result(path: Path) -> dict[str, Any]:
-    """The validated content of a `result.json`. Raises ConfigError naming the field, what was expected and found."""
+def read_result(path: Path, cell: str = "") -> dict[str, Any]:
+    """The validated content of a `result.json`, of this cell; empty: of any.
+
+    Raises ConfigError naming the field, what was expected and found.
+    """
     try:
         content = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
@@ -153,6 +156,8 @@ def read_result(path: Path) -> dict[str, Any]:
         text = " ".join(problem.message.split())
         raise ConfigError(f"{path}: not a {SCHEMA_ID}: {field}: {text[:200]}{'...' if len(text) > 200 else ''}")
     _check_graph(content["graph"], path)
+    if cell and content["cell"] != cell:
+        raise ConfigError(f"{path}: parameters of '{content['cell']}', this cell is '{cell}'")
     valid: dict[str, Any] = content
     return valid
 
