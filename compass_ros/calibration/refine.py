@@ -56,8 +56,9 @@ FINE = (0.1, 0.03)
 exact; the long ones see past what the simulator's steps at contacts do to a short one."""
 SETTLED = 0.3
 """Fall of the cost [log likelihood] by a step, or by all steps with the same differences, that is the last one."""
-UNEXPLAINED = 1.5
-"""Mean squared residual above which exact values are of no use: something else differs."""
+UNEXPLAINED, WORTHWHILE = 1.5, 0.05
+"""Mean squared residual above which exact values are of no use, since something else differs; there each round must
+gain this share of what is left."""
 _DAMPING = (1e-9, 1e-3, 1e-2, 1e-1, 1.0, 1e1)
 """Damping factors that are tried at once at the end."""
 
@@ -173,20 +174,23 @@ def settled(likelihood: Likelihood, fit: Fit) -> Fit:
     """
     free, robust, linear = fit.free, fit.robust, fit.linear
     point = replace(fit.point, cost=float(cost(likelihood, [fit.point], robust)[0][0]))
+    gained = np.inf
     for taken in range(SETTLING):
-        if taken >= 2 and 2 * point.cost > UNEXPLAINED * likelihood.measurements:
+        poor = 2 * point.cost > UNEXPLAINED * likelihood.measurements
+        if taken >= 2 and poor and gained < WORTHWHILE * (point.cost - 0.5 * likelihood.measurements):
             break
         linear = central(likelihood, point, free, FINE[taken % len(FINE)] * difference_steps(linear))
         before = point.cost
         for _ in range(SERVE):
             best, residual = _best_step(likelihood, point, linear, free, robust)
-            gained = point.cost - best.cost
-            if gained <= 0:
+            step = point.cost - best.cost
+            if step <= 0:
                 break
             point, linear = best, replace(linear, residual=residual)
-            if gained < SETTLED:
+            if step < SETTLED:
                 break
-        if taken > 0 and before - point.cost < SETTLED:
+        gained = before - point.cost
+        if taken > 0 and gained < SETTLED:
             break
     return replace(fit, point=point, linear=linear)
 

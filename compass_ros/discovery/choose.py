@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from compass_ros.calibration.least_squares import (
     Fit,
+    Point,
     cost,
+    minimise,
 )
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.joint import Joint, converge, from_second_start
+from compass_ros.discovery.joint import Joint, converge, from_second_start, widened
 from compass_ros.discovery.remainder import smooth_excess
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import screen
@@ -22,6 +26,8 @@ ENOUGH = 0.93
 """Share of the excess (cost above the noise floor) that a single effect must explain to be named alone."""
 PAIR_ENOUGH = 0.95
 """The same for two effects."""
+SURELY = 0.98
+"""Share below which the first of two is chosen once more, beside the second."""
 SMALL = 0.12
 """Excess of chi-square under which a remainder is put down to the effect's functional form..."""
 FORM_SHARE = 0.6
@@ -32,8 +38,9 @@ EQUAL_SHARE = 0.015
 """The same as a share of the excess: functional forms are never exactly right."""
 LITTLE, MANY_TIMES, SEVERAL = 0.12, 4.0, 2
 """Share that an effect may leave where at least so many others, fitted as well, leave so many times as much."""
-NEEDED = 0.05
-"""Share of the excess that an effect must be worth beside another that is enough."""
+NEEDED, SEEN = 0.05, 0.04
+"""Share of the excess that an effect must be worth beside another that is enough; or the excess of chi-square that the
+other leaves."""
 FORM_LEFT = 0.25
 """Part of what one effect leaves that a second may leave to be its cause."""
 OF_LIMIT = 8.0
@@ -152,6 +159,9 @@ def choose(
     best, *others = different(choice.singles)
     firsts = [best] if choice.share(best) > LEADS else [best, *(converge(j, slight, 4) for j in others[:1])]
     pair = _second(firsts, candidates, slight)
+    if pair and not (choice.shown_by(pair).share(pair) > SURELY and unseen.helps(pair)):
+        swapped = _second([_without_first(pair, space)], candidates, slight)
+        pair = min((p for p in (pair, swapped) if p), key=worth)
     if pair and pair.fit.point.cost < min(j.fit.point.cost for j in choice.singles):
         choice = choice.shown_by(pair)
     return replace(choice, pair=pair)
@@ -207,13 +217,13 @@ def simplest(good: Sequence[Joint]) -> Joint:
 def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
     """The same with a second effect where the first leaves something, and that has a cause of its own."""
     first = choice.singles[0]
-    if 1 - choice.share(first) < NEEDED:
+    if 1 - choice.share(first) < NEEDED and choice.remainder(first) < SEEN:
         return choice
     pair = _second([first], candidates, SLIGHT * choice.excess)
     if pair is None:
         return choice
     choice = replace(choice.shown_by(pair), pair=pair)
-    needed = choice.share(pair) - choice.share(first) > NEEDED
+    needed = choice.share(pair) - choice.share(first) > NEEDED or choice.remainder(first) > SEEN
     seen, rest = unseen.surprise(first) - unseen.surprise(pair), unseen.surprise(first) - unseen.floor
     predicts = seen > HELD_OUT_SHARE * rest if rest > HELD_OUT_SEEN else seen > -5.0
     return replace(choice, two=predicts and needed and choice.explains(pair, first))
@@ -222,6 +232,18 @@ def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOu
 def evidence(joint: Joint, unseen: HeldOut) -> float:
     """Log evidence of all episodes: of the fitted ones, and of the others as they are predicted."""
     return -worth(joint) - unseen.surprise(joint) / joint.likelihood.correlation_time
+
+
+def _without_first(pair: Joint, space: Space) -> Joint:
+    """The second effect of a pair alone: the first was chosen when nothing stood beside it."""
+    gone, kept = pair.added
+    simulator, likelihood = widened(space.simulator, space.likelihood, (kept,))
+    known, size = len(space.fit.point.values), len(gone.effect.quantities)
+    old = pair.fit.point
+    values = np.concatenate([old.values[:known], old.values[known + size :]])
+    free = np.concatenate([pair.fit.free[pair.fit.free < known], np.arange(known, len(values))])
+    fit = minimise(likelihood, Point(values, old.launch, np.inf), free, 4, pair.fit.robust, 2.0, fresh=False)
+    return Joint(simulator, likelihood, fit, (kept,))
 
 
 def _second(firsts: Sequence[Joint], candidates: Sequence[Candidate], slight: float) -> Joint | None:

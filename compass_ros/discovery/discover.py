@@ -15,6 +15,7 @@ from compass_ros.discovery.beginning import from_the_beginning
 from compass_ros.discovery.candidates import candidates
 from compass_ros.discovery.choose import Choice, choose
 from compass_ros.discovery.finding import Discovery, Finding, not_evaluated
+from compass_ros.discovery.followed import followed
 from compass_ros.discovery.information import information
 from compass_ros.discovery.maps import residual_map
 from compass_ros.discovery.null import Null, simulate_null
@@ -57,8 +58,8 @@ def discover(
         return report(Progress(stage, 0, 0.7 + 0.3 * done, float("nan"), float("nan")))
 
     tell("screen effects", 0.0)
-    asked = candidates(simulator)
-    space, scores = screen(simulator, refined.likelihood, refined.fit, asked)
+    asked, plain = candidates(simulator), followed(refined)
+    space, scores = screen(simulator, plain.likelihood, plain.fit, asked)
     null = simulate_null(space, scores, noise, seed)
     undetectable = plan_of(information(space, asked)).undetectable
     before = residual_map(space)
@@ -72,8 +73,8 @@ def discover(
         return found.failed(f"No verdict: {cause}. That is the simulator's numerics, not physics.")
     tell("fit effects", 0.4)
     unseen = held_out(judge, space.likelihood, space.fit)
-    choice = choose(space, scores, asked, unseen, from_the_beginning(simulator, refined, asked))
-    again = _restarted(refined, choice, simulator)
+    choice = choose(space, scores, asked, unseen, from_the_beginning(simulator, plain, asked))
+    again = _restarted(plain, choice, simulator)
     if again is not None:  # the plain simulator does better than it was thought to: begin again from there
         space, scores = screen(simulator, again.likelihood, again.fit, asked)
         found = replace(found, space=space, refined=again, null=simulate_null(space, scores, noise, seed))

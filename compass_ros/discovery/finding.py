@@ -133,7 +133,7 @@ class Finding:
         following = ""
         lacks = " and ".join(a.effect.sentence for a in joint.added)
         if ambiguous:
-            following = next_experiment(self.simulator, self.refined.likelihood, rivals, self.seed).sentence
+            following = next_experiment(self.simulator, self.space.likelihood, rivals, self.seed).sentence
             lacks = "one of these: " + "; ".join(a.effect.sentence for j in rivals for a in j.added)
         values = "; ".join(value_of(f) for f in findings)
         sentence = f"{place(where)}, the simulator lacks {lacks}; {values}; {self._errors(joint)}."
@@ -197,8 +197,8 @@ class Finding:
         kappa = self.noise.correlation_time
         gained = choice.floor + choice.excess - joint.fit.point.cost
         hessians = joint.log_evidence(kappa) + joint.fit.point.cost / kappa
-        plain = Joint(self.simulator, self.refined.likelihood, self.refined.fit, ())
-        without = plain.log_evidence(kappa) + self.refined.fit.point.cost / kappa
+        plain = Joint(self.simulator, self.space.likelihood, self.space.fit, ())
+        without = plain.log_evidence(kappa) + self.space.fit.point.cost / kappa
         return Evidence(self._gain(joint), gained / kappa + hessians - without, self.null.false_alarm_p(gained / kappa))
 
     def _std(self, joint: Joint) -> Floats:

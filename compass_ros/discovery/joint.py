@@ -18,7 +18,14 @@ from compass_ros.calibration.least_squares import (
     normal_equations,
 )
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import refine, scaled, settled
+from compass_ros.calibration.refine import (
+    FELT,
+    FELT_SHARE,
+    growing,
+    sensitivity,
+    settled,
+    typical_residual,
+)
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
@@ -130,10 +137,15 @@ def grown(joint: Joint, attached: Attached, simulator: Simulator, likelihood: Li
 def _refined(
     simulator: Simulator, likelihood: Likelihood, added: tuple[Attached, ...], values: Floats, robust: float
 ) -> Joint:
-    """A fit on a growing horizon, in the weights of `likelihood` and not in those that it ends with."""
-    end = refine(likelihood, values)
-    point = replace(end.fit.point, cost=float(cost(likelihood, [end.fit.point], robust)[0][0]))
-    fit = replace(end.fit, point=point, linear=scaled(end.fit.linear, end.likelihood, likelihood), robust=robust)
+    """A fit on a growing horizon to its optimum in the given weights, all that is felt free in the end."""
+    *_, (_, begun) = growing(likelihood, values)
+    influence = sensitivity(likelihood, begun.point)
+    of_effects = np.arange(len(simulator.cell.parameters), len(values))
+    free = np.union1d(influence.felt(FELT, FELT_SHARE), of_effects)
+    wide = max(robust, 3.0 * typical_residual(likelihood, begun.point))
+    steps = influence.steps[free]
+    fit = minimise(likelihood, begun.point, free, 5, wide, tolerance=3.0, steps=steps, fresh=False)
+    fit = settled(likelihood, replace(fit, robust=robust))
     return Joint(simulator, likelihood, fit, added, converged=True, settled=True)
 
 

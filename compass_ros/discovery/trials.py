@@ -9,14 +9,12 @@ from compass_ros.calibration.least_squares import minimise
 from compass_ros.discovery.joint import Joint, fit_jointly
 from compass_ros.discovery.screen import Score, Space
 
-ASKED = 12
-"""Names whose fit is sketched, the most promising first."""
 SKETCHED = 2
 """Steps of a sketch."""
 TRIED = 5
 """Sketches that are fitted at once, the best first; as many again where none of them is enough."""
-PROMISING = 0.1
-"""Least first-order gain, as a share of the best, to be tried."""
+PROMISING = 0.02
+"""Least first-order gain, as a share of the best, to be sketched: of contacts it says little."""
 
 
 def sketched(space: Space, scores: Sequence[Score]) -> list[Joint]:
@@ -53,9 +51,8 @@ def _promising(scores: Sequence[Score]) -> list[Score]:
     for s in sorted(scores, key=lambda s: -s.gain):
         best.setdefault(s.candidate.name, []).append(s)
     top = max((s[0].gain for s in best.values()), default=0.0)
-    names = sorted(best.values(), key=lambda group: -group[0].gain)[:ASKED]
     out = []
-    for group in names:
+    for group in best.values():
         if group[0].gain < max(PROMISING * top, 1e-9):
             continue
         out.append(group[0])
