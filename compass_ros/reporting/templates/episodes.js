@@ -63,7 +63,7 @@ const drawErrors = () => {
       });
     }
     if (data.floor_mm) shapes.push({ type: "line", xref: "paper", x0: 0, x1: 1, yref: `y${n}`, y0: data.floor_mm, y1: data.floor_mm, line: { color: colour("faint"), width: 1.2, dash: "dot" } });
-    annotations.push({ xref: "paper", x: 0, yref: "paper", y: 1 - i / rows - gap, yanchor: "bottom", xanchor: "left", showarrow: false, text: `${text(track.object)}: distance to the recording${i === 0 && data.floor_mm ? "; the dotted line is the noise floor" : ""}`, font: { size: 12, color: colour("soft") } });
+    annotations.push({ xref: "paper", x: 0, yref: "paper", y: 1 - i / rows - gap, yanchor: "bottom", xanchor: "left", showarrow: false, text: `${text(track.object)}: distance to the recording${i === 0 && data.floor_mm ? "; dotted: noise" : ""}`, font: { size: 12, color: colour("soft") } });
   });
   draw(errorPlot, traces, {
     ...axes, shapes, annotations, hovermode: "x unified", height: rows * (narrow ? 150 : 165) + 46, margin: { l: 8, r: 8, t: 6, b: 4 },

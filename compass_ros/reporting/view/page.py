@@ -56,7 +56,9 @@ def questions(result: Result) -> list[dict[str, Any]]:
 def _about_values(doubtful: int, failed: bool) -> str:
     if failed:
         return "these are not values to use"
-    return f"{doubtful} active ones are not identifiable" if doubtful else "with an error bar each"
+    if not doubtful:
+        return "with an error bar each"
+    return "one active one is not identifiable" if doubtful == 1 else f"{doubtful} active ones are not identifiable"
 
 
 def view(result: Result, extras: ReportExtras) -> dict[str, Any]:
