@@ -65,6 +65,9 @@ _DAMPING = (1e-9, 1e-3, 1e-2, 1e-1, 1.0, 1e1)
 SMALL = 0.3
 """Size of the changes that show the simulator's roughness, in steps of the differences: curvature must not count."""
 
+NONE: Ints = np.zeros(0, dtype=np.int64)
+"""No parameters."""
+
 Watch = Callable[[str, float, Point], bool]
 """(stage, share of the refinement done, where it stands) -> whether to go on."""
 
@@ -143,10 +146,8 @@ def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True)
 
     What is felt is asked here and not at the start, from where a puck may never have reached some wall.
     """
-    influence = sensitivity(likelihood, point)
-    felt = influence.felt(FELT, FELT_SHARE)
-    robust = max(ROBUST, 3.0 * typical_residual(likelihood, point))
-    fit = minimise(likelihood, point, felt, 3, robust, tolerance=3.0, steps=influence.steps[felt], fresh=False)
+    influence, fit = freed(likelihood, point, 3)
+    felt = fit.free
     watch("refine", 0.85, fit.point)
     rough = with_roughness(likelihood, fit)
     linear = scaled(fit.linear, likelihood, rough)
@@ -158,6 +159,20 @@ def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True)
         factor[: len(felt)] = coupling(influence.gram, felt, information_share(rough, fit))
         spread = spread * np.outer(factor, factor)
     return Refined(fit, rough, spread, chi_square(rough, fit), influence)
+
+
+def freed(
+    likelihood: Likelihood, point: Point, iterations: int, least: float = ROBUST, also: Ints = NONE
+) -> tuple[Influence, Fit]:
+    """Some steps with everything free that is felt at a point, and `also` these parameters.
+
+    The robust loss is wider than `least` where the residual still is.
+    """
+    influence = sensitivity(likelihood, point)
+    free = np.union1d(influence.felt(FELT, FELT_SHARE), also)
+    robust = max(least, 3.0 * typical_residual(likelihood, point))
+    steps = influence.steps[free]
+    return influence, minimise(likelihood, point, free, iterations, robust, tolerance=3.0, steps=steps, fresh=False)
 
 
 def some(likelihood: Likelihood) -> Likelihood:
@@ -306,11 +321,11 @@ def with_roughness(likelihood: Likelihood, fit: Fit, draws: int = 6) -> Likeliho
 
 def fitted_launches(likelihood: Likelihood, values: Floats) -> Floats:
     """(E, A) offsets of each episode's inputs that agree best with it, for (P,) values that stay as they are."""
-    point, nothing = start(likelihood, values), np.zeros(0, dtype=np.int64)
+    point = start(likelihood, values)
     if not likelihood.launch_std.any():
         return point.launch
     robust = max(ROBUST, 3.0 * typical_residual(likelihood, point))
-    return minimise(likelihood, point, nothing, 12, robust, tolerance=1.0, fresh=False).point.launch
+    return minimise(likelihood, point, NONE, 12, robust, tolerance=1.0, fresh=False).point.launch
 
 
 def standard_errors(refined: Refined) -> tuple[Ints, Floats]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, Point, minimise
+from compass_ros.calibration.least_squares import Fit, Point, cost, minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import Refined, growing, polish
 from compass_ros.discovery.candidates import Candidate
@@ -20,6 +20,8 @@ from compass_ros.discovery.joint import Joint, grown, widened
 from compass_ros.discovery.tangents import screen
 from compass_ros.discovery.trials import TRIED, different, further, sketched
 from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import Quantity
+from compass_ros.types import Floats
 
 POOR = 4.0
 """Mean squared residual of a plain fit from which nothing near it is of use."""
@@ -27,6 +29,8 @@ BEGUN = 1.1
 """Mean squared residual at which a simulator has begun to fail."""
 SLIGHT = 2.0
 """Log likelihood that a further step of these first fits must promise."""
+SIZES = (1.0, 4.0, 16.0)
+"""Of an effect that is tried, in its scale."""
 FEW = 2
 """Candidates that are followed to the end."""
 
@@ -41,12 +45,13 @@ class Beginning:
     """The best plain fit there."""
 
 
-def from_the_beginning(simulator: Simulator, refined: Refined, asked: Sequence[Candidate]) -> Iterator[list[Joint]]:
+def from_the_beginning(
+    simulator: Simulator, likelihood: Likelihood, fit: Fit, asked: Sequence[Candidate]
+) -> Iterator[list[Joint]]:
     """Effects that explain the beginning, each fitted to the whole episodes; none for a fair fit.
 
     An effect is there on the objects that the beginning tells, which not all may have moved by then, and on all.
     """
-    likelihood, fit = refined.likelihood, refined.fit
     if 2 * fit.point.cost < POOR * likelihood.measurements:
         return
     beginning = _where_it_fails(likelihood)
@@ -54,16 +59,16 @@ def from_the_beginning(simulator: Simulator, refined: Refined, asked: Sequence[C
         return
     failed = beginning.failed
     space, scores = screen(simulator, failed.likelihood, failed.fit, [c for c in asked if c.by_force])
-    begun = sorted((_begun(simulator, beginning, c) for c in asked if not c.by_force), key=_cost)
+    begun = sorted((_begun(simulator, beginning, c) for c in asked if not c.by_force), key=_left)
     promising = [*sketched(space, scores)[:TRIED], *(_freed(j, beginning) for j in different(begun)[:FEW])]
-    tried = sorted((further(j, SLIGHT, 4) for j in promising), key=_cost)
+    tried = sorted((further(j, SLIGHT, 4) for j in promising), key=_left)
     for joint in different(tried)[:FEW]:
         all_objects = next(c.attached for c in asked if c.name == joint.name)
         sets = dict.fromkeys((joint.added[0], all_objects if all_objects.effect.on == "objects" else joint.added[0]))
         yield [grown(joint, attached, simulator, likelihood, fit.robust) for attached in sets]
 
 
-def _cost(joint: Joint) -> float:
+def _left(joint: Joint) -> float:
     return joint.fit.point.cost
 
 
@@ -86,10 +91,30 @@ def _begun(simulator: Simulator, beginning: Beginning, candidate: Candidate) -> 
     wider, likelihood = widened(simulator, beginning.failed.likelihood, added)
     point, free = beginning.followed.point, beginning.followed.free
     effect = np.arange(len(point.values), len(likelihood.prior_mean))
-    start = Point(np.concatenate([point.values, likelihood.prior_mean[effect]]), point.launch, np.inf)
     robust = beginning.failed.fit.robust
-    fit = minimise(likelihood, start, np.concatenate([free, effect]), 5, robust, SLIGHT, fresh=False)
+    starts = [
+        Point(np.concatenate([point.values, numbers]), point.launch, np.inf)
+        for numbers in _sizes(candidate.attached.effect.quantities)
+    ]
+    best = int(np.argmin(cost(likelihood, starts, robust)[0]))
+    everything = np.concatenate([free, effect])
+    fits = [
+        minimise(likelihood, starts[i], everything, 5, robust, SLIGHT, fresh=False) for i in dict.fromkeys((0, best))
+    ]
+    fit = min(fits, key=lambda f: f.point.cost)
     return Joint(wider, likelihood, fit, added)
+
+
+def _sizes(quantities: Sequence[Quantity]) -> list[Floats]:
+    """(q,) settings to begin with: none, and each quantity alone, small and large. Some act beyond a limit only."""
+    sizes = [
+        np.where(np.arange(len(quantities)) == i, sign * size * q.scale, 0.0)
+        for i, q in enumerate(quantities)
+        for size in SIZES
+        for sign in (1.0, -1.0)
+        if q.low <= sign * size * q.scale <= q.high
+    ]
+    return [np.zeros(len(quantities)), *sizes]
 
 
 def _freed(joint: Joint, beginning: Beginning) -> Joint:

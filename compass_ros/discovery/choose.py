@@ -51,6 +51,8 @@ NEARLY = 0.85
 """Share from which the best effect is first fitted from a second start before others are tried."""
 LEADERS = 4
 """Best fits that are continued, and of which one may be named."""
+CLOSE = 4.0
+"""How far behind the best pair a second one may be to be followed too, in steps that promise SLIGHT."""
 SLIGHT = 0.005
 """Share of the excess that a further step of a fit must promise: models are compared by shares of it."""
 
@@ -158,10 +160,10 @@ def choose(
         return choice
     best, *others = different(choice.singles)
     firsts = [best] if choice.share(best) > LEADS else [best, *(converge(j, slight, 4) for j in others[:1])]
-    pair = _second(firsts, candidates, slight)
-    if pair and not (choice.shown_by(pair).share(pair) > SURELY and unseen.helps(pair)):
-        swapped = _second([_without_first(pair, space)], candidates, slight)
-        pair = min((p for p in (pair, swapped) if p), key=worth)
+    pairs = _pairs(firsts, candidates, slight)
+    if pairs and not (choice.shown_by(pairs[0]).share(pairs[0]) > SURELY and unseen.helps(pairs[0])):
+        pairs += _pairs([_without_first(pairs[0], space)], candidates, slight)
+    pair = max(pairs, key=lambda p: evidence(p, unseen), default=None)
     if pair and pair.fit.point.cost < min(j.fit.point.cost for j in choice.singles):
         choice = choice.shown_by(pair)
     return replace(choice, pair=pair)
@@ -219,9 +221,10 @@ def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOu
     first = choice.singles[0]
     if 1 - choice.share(first) < NEEDED and choice.remainder(first) < SEEN:
         return choice
-    pair = _second([first], candidates, SLIGHT * choice.excess)
-    if pair is None:
+    pairs = _pairs([first], candidates, SLIGHT * choice.excess)
+    if not pairs:
         return choice
+    pair = max(pairs, key=lambda p: evidence(p, unseen))
     choice = replace(choice.shown_by(pair), pair=pair)
     needed = choice.share(pair) - choice.share(first) > NEEDED or choice.remainder(first) > SEEN
     seen, rest = unseen.surprise(first) - unseen.surprise(pair), unseen.surprise(first) - unseen.floor
@@ -246,8 +249,11 @@ def _without_first(pair: Joint, space: Space) -> Joint:
     return Joint(simulator, likelihood, fit, (kept,))
 
 
-def _second(firsts: Sequence[Joint], candidates: Sequence[Candidate], slight: float) -> Joint | None:
-    """Some fits of one effect, each with the candidates that promise most of what it leaves: the best pair."""
+def _pairs(firsts: Sequence[Joint], candidates: Sequence[Candidate], slight: float) -> list[Joint]:
+    """Some fits of one effect, each with the candidates that promise most of what it leaves: the best two, converged.
+
+    The second best only where it leaves little more than the best: two forms of drag differ in the episodes held out.
+    """
     found: list[Joint] = []
     for first in firsts:
         own = {a.effect.name for a in first.added}
@@ -257,4 +263,5 @@ def _second(firsts: Sequence[Joint], candidates: Sequence[Candidate], slight: fl
             joint = further(sketch, slight, 4)
             found.append(Joint(joint.simulator, joint.likelihood, joint.fit, (*first.added, *joint.added)))
     best = sorted((further(j, slight, 5) for j in sorted(found, key=worth)[:3]), key=worth)
-    return converge(best[0], slight) if best else None
+    close = [j for j in best[:2] if worth(j) - worth(best[0]) < max(OF_LIMIT, CLOSE * slight)]
+    return sorted((converge(j, slight) for j in close), key=worth)

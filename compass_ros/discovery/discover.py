@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Point, minimise
+from compass_ros.calibration.least_squares import Fit, Point, minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import Refined, polish
@@ -58,8 +58,8 @@ def discover(
         return report(Progress(stage, 0, 0.7 + 0.3 * done, float("nan"), float("nan")))
 
     tell("screen effects", 0.0)
-    asked, plain = candidates(simulator), followed(refined)
-    space, scores = screen(simulator, plain.likelihood, plain.fit, asked)
+    asked, plain = candidates(simulator), followed(refined.likelihood, refined.fit)
+    space, scores = screen(simulator, *plain, asked)
     null = simulate_null(space, scores, noise, seed)
     undetectable = plan_of(information(space, asked)).undetectable
     before = residual_map(space)
@@ -73,8 +73,8 @@ def discover(
         return found.failed(f"No verdict: {cause}. That is the simulator's numerics, not physics.")
     tell("fit effects", 0.4)
     unseen = held_out(judge, space.likelihood, space.fit)
-    choice = choose(space, scores, asked, unseen, from_the_beginning(simulator, plain, asked))
-    again = _restarted(plain, choice, simulator)
+    choice = choose(space, scores, asked, unseen, from_the_beginning(simulator, *plain, asked))
+    again = _restarted(*plain, choice, simulator)
     if again is not None:  # the plain simulator does better than it was thought to: begin again from there
         space, scores = screen(simulator, again.likelihood, again.fit, asked)
         found = replace(found, space=space, refined=again, null=simulate_null(space, scores, noise, seed))
@@ -106,7 +106,7 @@ def _something(space: Space, scores: Sequence[Score], null: Null, noise: Noise) 
     return gain > max(LEAST_GAIN, 1.2 * null.largest) or excess > SOMETHING * noise.correlation_time
 
 
-def _restarted(refined: Refined, choice: Choice, simulator: Simulator) -> Refined | None:
+def _restarted(likelihood: Likelihood, fit: Fit, choice: Choice, simulator: Simulator) -> Refined | None:
     """The plain simulator fitted again from the best model's parameters, if that is a much better fit."""
     if not choice.singles:
         return None
@@ -115,7 +115,7 @@ def _restarted(refined: Refined, choice: Choice, simulator: Simulator) -> Refine
     start = Point(values, best.fit.point.launch, np.inf)
     clearly = max(RESTARTED * choice.excess, 5.0)
     tolerance = 0.2 * clearly
-    fit = minimise(refined.likelihood, start, refined.fit.free, 8, refined.fit.robust, tolerance, fresh=False)
-    if refined.fit.point.cost - fit.point.cost < clearly:
+    other = minimise(likelihood, start, fit.free, 8, fit.robust, tolerance, fresh=False)
+    if fit.point.cost - other.point.cost < clearly:
         return None
-    return polish(refined.likelihood, fit.point)
+    return polish(likelihood, other.point)

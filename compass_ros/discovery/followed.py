@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import median_filter
 
-from compass_ros.calibration.least_squares import minimise
+from compass_ros.calibration.least_squares import Fit, minimise
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import Refined, chi_square, covariance, residual_at
+from compass_ros.calibration.refine import residual_at
 from compass_ros.types import Floats
 
 LOST = 4.0
@@ -27,22 +27,18 @@ SLIGHT = 2.0
 """Log likelihood that a further step of these fits must promise."""
 
 
-def followed(refined: Refined) -> Refined:
-    """The plain fit to what it can follow; the same object where it follows all."""
-    likelihood, fit = refined.likelihood, refined.fit
+def followed(likelihood: Likelihood, fit: Fit) -> tuple[Likelihood, Fit]:
+    """The plain fit to what it can follow, in weights that say what that is; the same objects where it follows all."""
+    weighted = likelihood
     for _ in range(TURNS):
-        doubt = doubted(refined.likelihood, residual_at(refined.likelihood, fit.point))
+        doubt = doubted(likelihood, residual_at(likelihood, fit.point))
         if np.all(doubt == 1.0):
-            return refined
-        likelihood = replace(refined.likelihood, sigma=refined.likelihood.sigma * doubt[:, :, None])
-        fit = minimise(likelihood, fit.point, fit.free, 6, fit.robust, SLIGHT)
-    return replace(
-        refined,
-        fit=fit,
-        likelihood=likelihood,
-        covariance=covariance(likelihood, fit),
-        chi_square=chi_square(likelihood, fit),
-    )
+            if weighted is not likelihood:  # the fit without some frames follows these too
+                fit = minimise(likelihood, fit.point, fit.free, 6, fit.robust, SLIGHT)
+            return likelihood, fit
+        weighted = replace(likelihood, sigma=likelihood.sigma * doubt[:, :, None])
+        fit = minimise(weighted, fit.point, fit.free, 6, fit.robust, SLIGHT)
+    return weighted, fit
 
 
 def doubted(likelihood: Likelihood, residual: Floats) -> Floats:

@@ -20,10 +20,6 @@ from compass_ros.types import Floats, Ints, Parameter
 
 PLACES = (-0.5, 0.5)
 """Where a local field is tried beside its usual place, in parts of the way to the bounds."""
-LARGE = 0.3
-"""Step of effects that act only beyond a limit, in parts of the way to the bound."""
-FELT = 1e-2
-"""Change of all recordings together that counts as something [sigma]."""
 _LEAST = 1e-9
 """Share of a tangent that is called left over at least: rounding hides less."""
 
@@ -112,7 +108,7 @@ def _cases(space: Space, candidate: Candidate) -> Iterator[tuple[list[Quantity],
     """Amplitudes of each case with their (D, n) tangents per unit."""
     quantities = candidate.attached.effect.quantities
     if not candidate.by_force:
-        yield list(quantities), _of_steps(space, candidate)
+        yield list(quantities), differences(space, candidate)
         return
     amplitudes = [i for i, q in enumerate(quantities) if q.amplitude]
     units = np.diag([q.scale for q in quantities])[amplitudes]
@@ -127,16 +123,6 @@ def _cases(space: Space, candidate: Candidate) -> Iterator[tuple[list[Quantity],
     for shapes in _shapes(quantities):
         for direction, own in directions:
             yield own, space.tangent_of_weights(space.weights(candidate, shapes, direction))
-
-
-def _of_steps(space: Space, candidate: Candidate) -> Floats:
-    """(D, q) change per unit from a small step; from a large one where a small one does nothing (a limit)."""
-    small = differences(space, candidate)
-    effect = candidate.attached.effect
-    if np.linalg.norm(small * np.array([q.scale for q in effect.quantities])) > FELT:
-        return small
-    large = tuple(replace(q, scale=LARGE * q.high) for q in effect.quantities)
-    return differences(space, Candidate(replace(candidate.attached, effect=replace(effect, quantities=large))))
 
 
 def _shapes(quantities: Sequence[Quantity]) -> list[Floats]:

@@ -18,14 +18,7 @@ from compass_ros.calibration.least_squares import (
     normal_equations,
 )
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import (
-    FELT,
-    FELT_SHARE,
-    growing,
-    sensitivity,
-    settled,
-    typical_residual,
-)
+from compass_ros.calibration.refine import freed, growing, settled
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
@@ -139,12 +132,8 @@ def _refined(
 ) -> Joint:
     """A fit on a growing horizon to its optimum in the given weights, all that is felt free in the end."""
     *_, (_, begun) = growing(likelihood, values)
-    influence = sensitivity(likelihood, begun.point)
     of_effects = np.arange(len(simulator.cell.parameters), len(values))
-    free = np.union1d(influence.felt(FELT, FELT_SHARE), of_effects)
-    wide = max(robust, 3.0 * typical_residual(likelihood, begun.point))
-    steps = influence.steps[free]
-    fit = minimise(likelihood, begun.point, free, 5, wide, tolerance=3.0, steps=steps, fresh=False)
+    _, fit = freed(likelihood, begun.point, 5, robust, of_effects)
     fit = settled(likelihood, replace(fit, robust=robust))
     return Joint(simulator, likelihood, fit, added, converged=True, settled=True)
 

@@ -14,6 +14,13 @@ from compass_ros.discovery.screen import Score, Space, score_force, solve
 from compass_ros.simulation import Simulator
 from compass_ros.types import Floats
 
+FELT = 5.0
+"""Movement of all recordings together [sigma] from which a step says what an effect does."""
+IN_PROPORTION = 3.0
+"""Growth of what a step does when it is doubled, up to which the effect counts as proportional to its size."""
+STRETCH, LONGER = 4.0, 2
+"""By how much a step is lengthened that is not felt, and how often."""
+
 
 def screen(
     simulator: Simulator, likelihood: Likelihood, fit: Fit, asked: Sequence[Candidate]
@@ -29,27 +36,50 @@ def score(space: Space, candidate: Candidate) -> Score:
 
 
 def _score_rolled_out(space: Space, candidate: Candidate) -> Score:
+    """The best of steps that are doubled until they do twice as much: limits do nothing, then a lot."""
     quantities = candidate.attached.effect.quantities
-    columns = differences(space, candidate)
     scale = np.array([q.scale for q in quantities])
     low, high = (np.array([getattr(q, side) for q in quantities]) for side in ("low", "high"))
-    numbers, gain = solve(*space.reduced_tangent(columns), low, high, 20.0 * scale)
-    return Score(candidate, numbers, gain, columns @ numbers)
+    found: list[Score] = []
+    steps, before = scale, 0.0
+    while np.all(steps <= high):
+        change = _change(space, candidate, np.diag(steps))
+        columns = change / steps
+        numbers, gain = solve(*space.reduced_tangent(columns), low, high, 20.0 * scale)
+        found.append(Score(candidate, numbers, gain, columns @ numbers))
+        done = float(np.linalg.norm(change))
+        if FELT < done < IN_PROPORTION * before:
+            break
+        steps, before = 2.0 * steps, done
+    return max(found, key=lambda s: s.gain)
 
 
 def differences(space: Space, candidate: Candidate) -> Floats:
-    """(D, q) change of the weighted residual per unit of each quantity, from a step of its scale."""
+    """(D, q) change of the weighted residual per unit of each quantity, from a step of its scale.
+
+    The step is longer where that is not felt: a limit or a dead band does nothing until it is reached.
+    """
     quantities = candidate.attached.effect.quantities
+    steps = np.array([q.scale for q in quantities])
+    change = _change(space, candidate, np.diag(steps))
+    for _ in range(LONGER):
+        unfelt = (np.linalg.norm(change, axis=0) < FELT) & (steps * STRETCH < [q.high for q in quantities])
+        if not unfelt.any():
+            break
+        steps = np.where(unfelt, STRETCH * steps, steps)
+        change[:, unfelt] = _change(space, candidate, np.diag(steps)[unfelt])
+    return np.asarray(change / steps)
+
+
+def _change(space: Space, candidate: Candidate, numbers: Floats) -> Floats:
+    """(D, n) change of the weighted residual by each of (n, q) settings of an effect."""
     point, likelihood = space.fit.point, space.likelihood
     with_it = space.simulator.with_effects([*space.simulator.effects, candidate.attached])
-    known, episodes = len(point.values), len(likelihood.inputs)
-    values = np.zeros((len(quantities), known + len(quantities)))
-    values[:, :known] = point.values
-    values[:, known:] = np.diag([q.scale for q in quantities])
-    inputs = np.tile(likelihood.inputs + point.launch, (len(quantities), 1))
-    index = np.tile(np.arange(episodes), len(quantities))
+    episodes = len(likelihood.inputs)
+    values = np.concatenate([np.tile(point.values, (len(numbers), 1)), numbers], axis=1)
+    inputs = np.tile(likelihood.inputs + point.launch, (len(numbers), 1))
+    index = np.tile(np.arange(episodes), len(numbers))
     predicted = with_it.observe(np.repeat(values, episodes, axis=0), inputs, likelihood.time_s[index])
     there = np.nan_to_num((predicted - likelihood.measured[index]) / likelihood.sigma[index])
-    change = there.reshape(len(quantities), episodes, -1) - space.fit.linear.residual.reshape(episodes, -1)
-    scale = np.array([q.scale for q in quantities])
-    return np.asarray((change * space.weight).reshape(len(quantities), -1).T / scale)
+    change = there.reshape(len(numbers), episodes, -1) - space.fit.linear.residual.reshape(episodes, -1)
+    return np.asarray((change * space.weight).reshape(len(numbers), -1).T)

@@ -46,9 +46,9 @@ def different(singles: Sequence[Joint]) -> list[Joint]:
 
 
 def _promising(scores: Sequence[Score]) -> list[Score]:
-    """The best objects of each name, and all objects together where that is almost as good."""
+    """Of scores, the best first: the best objects of each name, and all together where that is almost as good."""
     best: dict[str, list[Score]] = {}
-    for s in sorted(scores, key=lambda s: -s.gain):
+    for s in scores:
         best.setdefault(s.candidate.name, []).append(s)
     top = max((s[0].gain for s in best.values()), default=0.0)
     out = []

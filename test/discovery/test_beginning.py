@@ -21,7 +21,7 @@ def test_a_centre_of_mass_beside_the_centre() -> None:
     refined = refine(likelihood, simulator().defaults)
     assert 2 * refined.fit.point.cost > POOR * likelihood.measurements, "else there is nothing to show"
     asked = [c for c in candidates(simulator()) if c.name in ASKED]
-    found = next(from_the_beginning(simulator(), refined, asked))
+    found = next(from_the_beginning(simulator(), likelihood, refined.fit, asked))
     best = min(found, key=lambda joint: joint.fit.point.cost)
     assert best.added == (effect,)
     assert best.fit.point.cost < 0.2 * refined.fit.point.cost
@@ -29,5 +29,6 @@ def test_a_centre_of_mass_beside_the_centre() -> None:
 
 
 def test_a_fair_fit_asks_for_nothing() -> None:
-    refined = refine(recorded(None, []), simulator().defaults)
-    assert not list(from_the_beginning(simulator(), refined, candidates(simulator())))
+    likelihood = recorded(None, [])
+    fit = refine(likelihood, simulator().defaults).fit
+    assert not list(from_the_beginning(simulator(), likelihood, fit, candidates(simulator())))

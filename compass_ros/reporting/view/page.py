@@ -58,7 +58,7 @@ def _about_values(doubtful: int, failed: bool) -> str:
         return "these are not values to use"
     if not doubtful:
         return "with an error bar each"
-    return "one active one is not identifiable" if doubtful == 1 else f"{doubtful} active ones are not identifiable"
+    return f"{doubtful} active {'one is' if doubtful == 1 else 'ones are'} not identifiable"
 
 
 def view(result: Result, extras: ReportExtras) -> dict[str, Any]:
