@@ -23,8 +23,6 @@ from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Quantity
 from compass_ros.types import Floats
 
-POOR = 4.0
-"""Mean squared residual of a plain fit from which nothing near it is of use."""
 BEGUN = 1.1
 """Mean squared residual at which a simulator has begun to fail."""
 SLIGHT = 2.0
@@ -48,12 +46,11 @@ class Beginning:
 def from_the_beginning(
     simulator: Simulator, likelihood: Likelihood, fit: Fit, asked: Sequence[Candidate]
 ) -> Iterator[list[Joint]]:
-    """Effects that explain the beginning, each fitted to the whole episodes; none for a fair fit.
+    """Effects that explain the beginning, each fitted to the whole episodes.
 
     An effect is there on the objects that the beginning tells, which not all may have moved by then, and on all.
+    `likelihood` and `fit`: what the plain simulator follows of the episodes.
     """
-    if 2 * fit.point.cost < POOR * likelihood.measurements:
-        return
     beginning = _where_it_fails(likelihood)
     if beginning is None:
         return

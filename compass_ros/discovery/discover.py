@@ -37,6 +37,8 @@ NOTICED = 0.25
 """Least rms movement by what is missing, as a share of the cell's expected noise: less is the tracker's own error."""
 RESTARTED = 0.15
 """Share of the excess by which a plain fit from elsewhere must be better to be the new beginning."""
+POOR = 4.0
+"""Mean squared residual of a plain fit from which nothing near it is of use."""
 MIN_EPISODES = 3
 
 
@@ -73,7 +75,8 @@ def discover(
         return found.failed(f"No verdict: {cause}. That is the simulator's numerics, not physics.")
     tell("fit effects", 0.4)
     unseen = held_out(judge, space.likelihood, space.fit)
-    choice = choose(space, scores, asked, unseen, from_the_beginning(simulator, *plain, asked))
+    early = from_the_beginning(simulator, *plain, asked) if poor(refined) else ()
+    choice = choose(space, scores, asked, unseen, early)
     again = _restarted(*plain, choice, simulator)
     if again is not None:  # the plain simulator does better than it was thought to: begin again from there
         space, scores = screen(simulator, again.likelihood, again.fit, asked)
@@ -84,6 +87,11 @@ def discover(
         choice = choose(space, scores, asked, unseen)
     tell("weigh effects", 0.9)
     return found.judged(choice, unseen)
+
+
+def poor(refined: Refined) -> bool:
+    """Whether effects are better tried on the beginning of the episodes: frames that are lost count in full."""
+    return 2 * refined.fit.point.cost > POOR * refined.likelihood.measurements
 
 
 def _lacking(simulator: Simulator, episodes: int) -> str:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from compass_ros.calibration.refine import refine
-from compass_ros.discovery.beginning import POOR, from_the_beginning
+from compass_ros.discovery.beginning import from_the_beginning
 from compass_ros.discovery.candidates import candidates
+from compass_ros.discovery.discover import poor
 from compass_ros.simulation.effects import EFFECTS, Attached
 from test.discovery.planted import CALM, HELD_OUT, PUCKS, recorded
 from test.simulation.table import simulator
@@ -19,7 +20,7 @@ def test_a_centre_of_mass_beside_the_centre() -> None:
     effect = Attached(EFFECTS["off_centre_mass"], PUCKS)
     likelihood = recorded(effect, [0.003, -0.002], SHOTS)
     refined = refine(likelihood, simulator().defaults)
-    assert 2 * refined.fit.point.cost > POOR * likelihood.measurements, "else there is nothing to show"
+    assert poor(refined), "else there is nothing to show"
     asked = [c for c in candidates(simulator()) if c.name in ASKED]
     found = next(from_the_beginning(simulator(), likelihood, refined.fit, asked))
     best = min(found, key=lambda joint: joint.fit.point.cost)
@@ -29,6 +30,4 @@ def test_a_centre_of_mass_beside_the_centre() -> None:
 
 
 def test_a_fair_fit_asks_for_nothing() -> None:
-    likelihood = recorded(None, [])
-    fit = refine(likelihood, simulator().defaults).fit
-    assert not list(from_the_beginning(simulator(), likelihood, fit, candidates(simulator())))
+    assert not poor(refine(recorded(None, []), simulator().defaults))
