@@ -86,6 +86,7 @@ setup(
         "scikit-learn<1.8",  # pysindy 1.7 calls what 1.8 took away
         "scipy",
         "stable-baselines3",
+        "threadpoolctl",
         "torch",
         "typer",
         "zstandard",

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from compass_ros.errors import TrackingError
 from compass_ros.tracking.association import Detection, assign
@@ -77,9 +78,10 @@ class TrackerState:
 
 
 def use_one_core() -> None:
-    """Keep OpenCV to the calling thread: on images this small its threads cost more than they bring, and on a busy
-    machine they wait for each other."""
+    """Keep OpenCV and linear algebra to the calling thread: on images and matrices this small their threads cost more
+    than they bring, and on a busy machine they wait for each other."""
     cv2.setNumThreads(1)
+    threadpool_limits(1)
 
 
 def step(
