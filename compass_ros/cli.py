@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 
 import typer
+from threadpoolctl import threadpool_limits
 
 from compass_ros.commands import (
     bench,
@@ -38,7 +39,11 @@ for module in (conceal, unseal, prove, rivals, bench, real, tables):
 
 
 def main() -> None:
-    """Run the command line; what a user can mend ends as one line and status 1."""
+    """Run the command line; what a user can mend ends as one line and status 1.
+
+    Rollouts take all cores; linear algebra takes one, so that a result does not depend on how many there are.
+    """
+    threadpool_limits(1, "blas")
     try:
         app()
     except CompassError as error:

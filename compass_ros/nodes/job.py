@@ -31,7 +31,7 @@ from compass_ros.types import Progress
 
 ORIGIN = "origin.yaml"
 """What a result came from, beside it."""
-POLITELY = ("nice", "-n", "10")
+POLITELY = ("nice", "-n", "19")
 """A calibration takes what the tracker and the recorder leave of the machine."""
 
 
