@@ -11,6 +11,7 @@ import rclpy
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from threadpoolctl import threadpool_limits
 
 from compass_ros.errors import CompassError
 from compass_ros.nodes.managed import ManagedNode
@@ -27,6 +28,7 @@ def run(make: Callable[[], Node], name: str, threads: int = 1) -> None:
     Signals end the loop between two callbacks, before the context is closed: no callback finds its publishers gone.
     An exception that a signal raises inside of rclpy could surface as anything; so a signal only leaves a note.
     """
+    threadpool_limits(1, "blas")  # the nodes of a cell share its cores: threads that wait for each other take them
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     told = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
