@@ -261,7 +261,7 @@ def _pairs(firsts: Sequence[Joint], candidates: Sequence[Candidate], slight: flo
         there, scores = screen(first.simulator, first.likelihood, first.fit, others)
         for sketch in sketched(there, scores)[:TRIED]:
             joint = further(sketch, slight, 4)
-            found.append(Joint(joint.simulator, joint.likelihood, joint.fit, (*first.added, *joint.added)))
+            found.append(replace(joint, added=(*first.added, *joint.added)))
     best = sorted((further(j, slight, 5) for j in sorted(found, key=worth)[:3]), key=worth)
     close = [j for j in best[:2] if worth(j) - worth(best[0]) < max(OF_LIMIT, CLOSE * slight)]
     return sorted((converge(j, slight) for j in close), key=worth)
