@@ -36,6 +36,8 @@ EQUAL = 3.0
 """Log evidence within which two effects are told apart by nothing."""
 EQUAL_SHARE = 0.015
 """The same as a share of the excess: functional forms are never exactly right."""
+PREDICTS = 0.92
+"""Share of the held-out excess that what is named must remove, but for a SMALL remainder: less is another law's."""
 LITTLE, MANY_TIMES, SEVERAL = 0.12, 4.0, 2
 """Share that an effect may leave where at least so many others, fitted as well, leave so many times as much."""
 NEEDED, SEEN = 0.05, 0.04
@@ -100,8 +102,14 @@ class Choice:
 
     def good(self, unseen: HeldOut) -> list[Joint]:
         """Models of one effect that may be named, the best first."""
-        good = [j for j in self.singles[:LEADERS] if self.enough(j) and unseen.helps(j)]
+        good = [j for j in self.singles[:LEADERS] if self.nameable(j, unseen)]
         return sorted(good, key=lambda j: -evidence(j, unseen))
+
+    def nameable(self, joint: Joint, unseen: HeldOut) -> bool:
+        """Whether a model explains the fitted episodes and predicts the others."""
+        share = unseen.share(joint)
+        predicts = share >= PREDICTS or (share >= FORM_SHARE and unseen.remainder(joint) < SMALL)
+        return self.enough(joint) and unseen.helps(joint) and predicts
 
     def enough(self, joint: Joint) -> bool:
         """Whether a model explains what there is to explain."""

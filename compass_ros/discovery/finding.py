@@ -101,11 +101,11 @@ class Finding:
         best = choice.singles[0] if choice.singles else None
         if choice.two and choice.pair is not None:
             return self.named(choice.pair, choice, ((), ()))
-        if best is not None and choice.enough(best) and unseen.helps(best):
+        if best is not None and choice.nameable(best, unseen):
             return self.named(best, choice, (choice.equal,))
         pair = choice.pair
         both = pair is not None and best is not None and choice.explains(pair, best)
-        if pair is not None and both and choice.enough(pair) and unseen.helps(pair):
+        if pair is not None and both and choice.nameable(pair, unseen):
             return self.named(pair, choice, ((), ()))
         return self.unknown(choice)
 

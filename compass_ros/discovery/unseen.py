@@ -49,6 +49,15 @@ class HeldOut:
             self._asked[joint] = surprise(self.likelihood, joint.likelihood, joint.fit)
         return self._asked[joint]
 
+    def share(self, joint: Joint) -> float:
+        """Part of the held-out excess that a model removes; 1 where there is none to speak of."""
+        excess = self.before - self.floor
+        return (self.before - self.surprise(joint)) / excess if excess > HELD_OUT_SEEN else 1.0
+
+    def remainder(self, joint: Joint) -> float:
+        """Excess of chi-square that a model leaves in these episodes."""
+        return 2 * max(self.surprise(joint) - self.floor, 0.0) / self.likelihood.measurements
+
     def helps(self, joint: Joint) -> bool:
         """Whether a model predicts these episodes better: clearly, where there is something to gain."""
         excess, gain = self.before - self.floor, self.before - self.surprise(joint)
