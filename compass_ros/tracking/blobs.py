@@ -61,12 +61,15 @@ def find_blobs(
     than what it shows itself.
     """
     mask = colour_mask(hsv, look)
-    count, labels, stats, centroids = cv2.connectedComponentsWithStats(mask, connectivity=4)
-    if count < 2:
+    left, top, wide, high = cv2.boundingRect(mask)
+    if not wide:
         return ()
+    # to count spots costs by the pixel, coloured or not
+    mask = mask[top : top + high, left : left + wide]
+    _, labels, stats, centroids = cv2.connectedComponentsWithStats(mask, connectivity=4)
     # the centre of a half-size pixel (0, 0) lies between the first four pixels
-    pixels = centroids[1:] * _SHRINK + 0.5 * (_SHRINK - 1)
-    scale = _SHRINK * view.metres_per_pixel(np.zeros(2))
+    pixels = (centroids[1:] + np.array([left, top])) * _SHRINK + 0.5 * (_SHRINK - 1)
+    scale = _SHRINK * view.metres_per_pixel
     shares = stats[1:, cv2.CC_STAT_AREA] * scale**2 / (np.pi * look.radius_m**2)
     fitting = np.flatnonzero((shares > _LEAST_SHARE) & (shares < _MOST_SHARE))
     if fitting.size == 0:
@@ -82,7 +85,7 @@ def find_blobs(
         elif not whole:
             x, y, width, height = stats[index + 1, :4]
             spot = np.asarray(labels[y : y + height, x : x + width] == index + 1, dtype=np.uint8)
-            guess = _vote(spot, (x, y), centre, view, look)
+            guess = _vote(spot, (left + x, top + y), centre, view, look)
         blobs.append(Blob(guess, float(shares[index])))
     return tuple(sorted(blobs, key=lambda blob: -blob.share))
 
@@ -99,7 +102,7 @@ def _vote(
     centres = centroid + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     distance = np.linalg.norm(centres[:, None] - edge[None], axis=-1)
     # outline pixels lie about half a small pixel inside of the rim
-    slack = _SHRINK * view.metres_per_pixel(np.zeros(2))
+    slack = _SHRINK * view.metres_per_pixel
     inside = distance < look.radius_m + 0.5 * slack
     on_rim = inside & (distance > look.radius_m - 1.5 * slack)
     score = on_rim.sum(axis=1) - 4.0 * (~inside).sum(axis=1)

@@ -95,11 +95,11 @@ class TableView:
         eye = self.position
         return np.asarray(eye[:2] + rays[:, :2] * ((height_m - eye[2]) / rays[:, 2:]))
 
-    def metres_per_pixel(self, xy: Floats) -> float:
-        """Length on the table's surface that one pixel covers around `xy` (2,) [m]."""
+    @cached_property
+    def metres_per_pixel(self) -> float:
+        """Length on the table's surface that one pixel covers around the table's origin."""
         step = 1e-3
-        corner = np.array([*xy, 0.0])
-        moved = self.pixel_from_table(corner + np.array([[0, 0, 0], [step, 0, 0], [0, step, 0]]))
+        moved = self.pixel_from_table(np.array([[0.0, 0, 0], [step, 0, 0], [0, step, 0]]))
         jacobian = (moved[1:] - moved[0]) / step
         return float(1 / np.sqrt(abs(np.linalg.det(jacobian))))
 
