@@ -55,6 +55,7 @@ class Space:
         self.residual = (fit.linear.residual.reshape(episodes, -1) * self.weight).ravel()
         self.parameters = parameters.reshape(self.residual.size, -1)
         self.inverse = np.linalg.inv(self.parameters.T @ self.parameters + np.eye(self.parameters.shape[1]))
+        self._parameter_pull = self.parameters.T @ self.residual
         response = pushes.response * self.weight[:, :, None]
         self._response = response
         self._gram = np.einsum("edh,edi->ehi", response, response)
@@ -95,10 +96,10 @@ class Space:
 
     def reduced(self, weights: Floats) -> tuple[Floats, Floats]:
         """(n, n) S and (n,) g of accelerations, with the parameters taken out."""
-        gram = np.einsum("ehm,ehi,ein->mn", weights, self._gram, weights, optimize=True)
-        cross = np.einsum("ehn,ehp->np", weights, self._cross)
-        pull = np.einsum("ehn,eh->n", weights, self._pull)
-        return self._project(gram, cross, pull)
+        columns = weights.reshape(-1, weights.shape[2])
+        gram = columns.T @ (self._gram @ weights).reshape(columns.shape)
+        cross = columns.T @ self._cross.reshape(len(columns), -1)
+        return self._project(gram, cross, columns.T @ self._pull.ravel())
 
     def reduced_tangent(self, tangent: Floats) -> tuple[Floats, Floats]:
         """The same for (D, n) tangents."""
@@ -106,7 +107,7 @@ class Space:
 
     def _project(self, gram: Floats, cross: Floats, pull: Floats) -> tuple[Floats, Floats]:
         absorbed = cross @ self.inverse
-        return gram - absorbed @ cross.T, pull - absorbed @ (self.parameters.T @ self.residual)
+        return gram - absorbed @ cross.T, pull - absorbed @ self._parameter_pull
 
     def off_parameters(self, tangent: Floats) -> Floats:
         """(D, n) the part of tangents that the parameters cannot take."""
@@ -183,14 +184,15 @@ def _at(space: Space, candidate: Candidate, shapes: Floats) -> tuple[Floats, flo
         numbers = shapes.copy()
         numbers[amplitude_of] = amplitudes
         return numbers, gain
+    angles = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    rays = np.cos(angles)[:, None] * unit[0] + np.sin(angles)[:, None] * unit[1]
+    matrix, pull = space.reduced(space.weights(candidate, shapes, rays))
     best = (shapes, 0.0)
-    for angle in np.linspace(0, 2 * np.pi, 12, endpoint=False):
-        ray = np.cos(angle) * unit[0] + np.sin(angle) * unit[1]
-        top = float(np.max(np.abs(ray)))
-        size, gain = solve(*space.reduced(space.weights(candidate, shapes, ray[None])),
-                           np.zeros(1), np.array([high.min()]), 20.0 * prior[:1])  # fmt: skip
+    for i, ray in enumerate(rays):
+        one = slice(i, i + 1)
+        size, gain = solve(matrix[one, one], pull[one], np.zeros(1), np.array([high.min()]), 20.0 * prior[:1])
         if gain > best[1]:
-            best = (shapes + ray / top * size[0], gain)
+            best = (shapes + ray / float(np.max(np.abs(ray))) * size[0], gain)
     return best
 
 
