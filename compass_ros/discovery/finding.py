@@ -107,7 +107,7 @@ class Finding:
         both = pair is not None and best is not None and choice.explains(pair, best)
         if pair is not None and both and choice.nameable(pair, unseen):
             return self.named(pair, choice, ((), ()))
-        return self.unknown(choice)
+        return self.unknown(choice, unseen)
 
     def named(self, joint: Joint, choice: Choice, equal: tuple[tuple[Joint, ...], ...]) -> Discovery:
         """One or two effects with values, errors and evidence."""
@@ -141,7 +141,7 @@ class Finding:
         mismatch = Mismatch(verdict, where, tuple(findings), self.undetectable, following, sentence)
         return self._with(joint, mismatch, choice, std)
 
-    def unknown(self, choice: Choice) -> Discovery:
+    def unknown(self, choice: Choice, unseen: HeldOut) -> Discovery:
         """Something is there that no known effect explains; a formula is proposed where one predicts."""
         where, sure = whereabouts(self.space, choice)
         if not sure and not choice.singles:
@@ -150,7 +150,9 @@ class Finding:
         sentence = f"{place(where)}, something differs that no known effect explains"
         if choice.singles:
             best = choice.singles[0]
-            sentence += f" (the best, {best.name}, explains {100 * choice.share(best):.0f} % of it)"
+            explained, predicted = 100 * choice.share(best), 100 * np.clip(unseen.share(best), 0, 1)
+            sentence += f" (the best, {best.name}, explains {explained:.0f} % of it"
+            sentence += f", and {predicted:.0f} % in held-out episodes)"
         sentence += f"; {proposal.sentence}" if proposal else "."
         mismatch = Mismatch("unknown", where, (), self.undetectable, "", sentence)
         if proposal is None:
