@@ -48,7 +48,7 @@ LINE: Mapping[Model, str] = {"nominal": ":", "calibrated": "--", "with_effects":
 ROLE: Mapping[str, Mapping[str, Any]] = {
     "table": {"fill": False, "edgecolor": LIGHT["faint"], "linewidth": 1.0},
     "obstacle": {"facecolor": LIGHT["faint"], "alpha": 0.4},
-    "goal": {"facecolor": LIGHT["with_effects"], "alpha": 0.12},
+    "goal": {"facecolor": LIGHT["ink"], "alpha": 0.06},
 }
 
 

@@ -41,7 +41,7 @@ const drawTable = () => {
   const traces = tracks.flatMap((track) => order.filter((c) => track[c.key]).map((c) => curveTrace(track, c)));
   const box = extent();
   draw(tablePlot, [...traces, ...momentTraces()], {
-    ...tableAxes(box), height: tableHeight(tablePlot, box, 0), shapes: [...sceneShapes(), ...startShapes(tracks)], annotations: startMarks(tracks), hovermode: "closest",
+    ...tableAxes(box), height: tableHeight(tablePlot, box, 0), shapes: [...sceneShapes(), ...startShapes(tracks)], annotations: [...sceneMarks(), ...startMarks(tracks)], hovermode: "closest",
   });
 };
 

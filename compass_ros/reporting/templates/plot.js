@@ -82,13 +82,18 @@ const circlePath = ([x, y], radius) => {
 
 const sceneShapes = () => data.scene.shapes.map((shape) => {
   const [x, y] = shape.centre, [w, h] = shape.size.map((s) => s / 2);
-  const fill = { table: colour("surface"), obstacle: faded("ink", 0.22), goal: faded("with_effects", 0.1) }[shape.role];
+  const fill = { table: colour("surface"), obstacle: faded("ink", 0.22), goal: faded("ink", 0.05) }[shape.role];
   if (shape.kind === "circle") return { type: "path", layer: "below", path: circlePath(shape.centre, w), fillcolor: fill, line: { width: 0 } };
   return {
     type: "rect", layer: "below", x0: x - w, x1: x + w, y0: y - h, y1: y + h,
     fillcolor: fill, line: { width: shape.role === "table" ? 1.2 : 0, color: colour("faint") },
   };
 });
+
+// An area that is not a thing says what it is.
+const sceneMarks = () => data.scene.shapes.filter((shape) => shape.role === "goal").map((shape) => ({
+  x: shape.centre[0], y: shape.centre[1], showarrow: false, text: "goal", font: { size: 11, color: colour("faint") },
+}));
 
 // What every drawing on the table shows: the table and all recorded motion, with a small margin.
 const extent = () => {
