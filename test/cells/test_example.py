@@ -15,6 +15,7 @@ from compass_ros.config import calibration_config
 from compass_ros.episodes import Source, read_episodes
 from compass_ros.pipeline import calibrate
 from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import EFFECTS
 from compass_ros.simulation.replay import Replay, recordings
 from compass_ros.types import Episode
 
@@ -43,6 +44,13 @@ def test_the_calibration_finds_them() -> None:
         assert found[name].identifiable
         assert found[name].value == pytest.approx(value, rel=0.02), name
     assert not found["env@dyna@gravity"].identifiable
+
+
+def test_every_effect_says_whether_it_can_act_on_a_joint_that_no_body_is_named_after() -> None:
+    simulator = Simulator(CELL, threads=1)
+    able = {name for name, effect in EFFECTS.items() if effect.on == "objects" and simulator.accepts(effect, ["swing"])}
+    assert {"coulomb_friction", "viscous_drag"} <= able
+    assert "off_centre_mass" not in able
 
 
 def test_the_documentation_names_fields_that_exist() -> None:

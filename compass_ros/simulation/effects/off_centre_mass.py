@@ -13,8 +13,11 @@ from compass_ros.types import Floats
 
 
 def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
+    bodies = {model.body(i).name: i for i in range(model.nbody)}
     for name in context.objects:
-        body = model.body(name).id
+        if name not in bodies:
+            raise ConfigError(f"off_centre_mass acts on bodies, '{name}' is a joint")
+        body = bodies[name]
         if model.body_simple[body] and numbers.any():
             raise ConfigError(
                 f"off_centre_mass cannot act on '{name}': MuJoCo has compiled it as centred for good; "
