@@ -9,7 +9,7 @@ import numpy as np
 
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
-from compass_ros.calibration.refine import Refined, covariance
+from compass_ros.calibration.refine import Refined, covariance, fitted_launches
 from compass_ros.discovery.choose import Choice
 from compass_ros.discovery.formula import Proposal, propose
 from compass_ros.discovery.joint import Joint, from_second_start
@@ -79,7 +79,7 @@ class Finding:
 
     def none(self, scores: Sequence[Score]) -> Discovery:
         """The noise explains everything."""
-        seen = self._held_out(self.simulator, self.refined.fit.point.values)
+        seen = self._held_out(self.space.likelihood, self.refined.fit.point.values)
         sentence = (
             f"Nothing is missing that these recordings could show: held-out error {1e3 * seen:.2f} mm, "
             f"noise {1e3 * self._floor():.2f} mm."
@@ -175,10 +175,11 @@ class Finding:
             self.warnings,
         )
 
-    def _held_out(self, simulator: Simulator, values: Floats) -> float:
-        """rms distance on held-out episodes [m]."""
-        tiled = np.tile(values, (len(self.judge.inputs), 1))
-        missed = simulator.observe(tiled, self.judge.inputs, self.judge.time_s) - self.judge.measured
+    def _held_out(self, likelihood: Likelihood, values: Floats) -> float:
+        """rms distance on held-out episodes [m], each with the launch that agrees best with it."""
+        judged = likelihood.on(self.judge)
+        inputs = judged.inputs + fitted_launches(judged, values)
+        missed = judged.predict(np.tile(values, (len(inputs), 1)), inputs, judged.time_s) - judged.measured
         objects = max(len(self.simulator.cell.objects), 1)
         return float(np.sqrt(np.nanmean(missed**2) * missed.shape[2] / objects))
 
@@ -187,12 +188,12 @@ class Finding:
         return float(np.sqrt(np.sum(self.noise.sigma**2) / objects))
 
     def _errors(self, joint: Joint) -> str:
-        before = self._held_out(self.simulator, self.refined.fit.point.values)
-        return errors(before, self._held_out(joint.simulator, joint.fit.point.values), self._floor())
+        before = self._held_out(self.space.likelihood, self.refined.fit.point.values)
+        return errors(before, self._held_out(joint.likelihood, joint.fit.point.values), self._floor())
 
     def _gain(self, joint: Joint) -> float:
-        before = self._held_out(self.simulator, self.refined.fit.point.values)
-        after, floor = self._held_out(joint.simulator, joint.fit.point.values), self._floor()
+        before = self._held_out(self.space.likelihood, self.refined.fit.point.values)
+        after, floor = self._held_out(joint.likelihood, joint.fit.point.values), self._floor()
         return float(np.clip((before - after) / max(before - floor, 1e-9), -1.0, 1.0))
 
     def _evidence(self, joint: Joint, choice: Choice) -> Evidence:

@@ -46,6 +46,14 @@ def test_the_calibration_finds_them() -> None:
     assert not found["env@dyna@gravity"].identifiable
 
 
+def test_nothing_is_missing_and_the_sentence_says_what_the_table_says() -> None:
+    """The first velocity is fitted to each held-out swing, for both."""
+    result, _ = calibrate(episodes(), CELL, calibration_config({}))
+    assert result.mismatch.verdict == "none"
+    held_out = result.gap["calibrated"]["held_out"].rmse_m
+    assert f"held-out error {1e3 * held_out:.2f} mm" in result.mismatch.sentence
+
+
 def test_every_effect_says_whether_it_can_act_on_a_joint_that_no_body_is_named_after() -> None:
     simulator = Simulator(CELL, threads=1)
     able = {name for name, effect in EFFECTS.items() if effect.on == "objects" and simulator.accepts(effect, ["swing"])}
