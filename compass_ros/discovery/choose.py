@@ -20,7 +20,7 @@ from compass_ros.discovery.remainder import smooth_excess
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import screen
 from compass_ros.discovery.trials import TRIED, different, further, sketched, worth
-from compass_ros.discovery.unseen import HELD_OUT_SEEN, HELD_OUT_SHARE, HeldOut
+from compass_ros.discovery.unseen import HeldOut
 
 ENOUGH = 0.93
 """Share of the excess (cost above the noise floor) that a single effect must explain to be named alone."""
@@ -235,8 +235,7 @@ def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOu
     pair = max(pairs, key=lambda p: evidence(p, unseen))
     choice = replace(choice.shown_by(pair), pair=pair)
     needed = choice.share(pair) - choice.share(first) > NEEDED or choice.remainder(first) > SEEN
-    seen, rest = unseen.surprise(first) - unseen.surprise(pair), unseen.surprise(first) - unseen.floor
-    predicts = seen > HELD_OUT_SHARE * rest if rest > HELD_OUT_SEEN else seen > -5.0
+    predicts = unseen.beside(first).helps(pair)
     return replace(choice, two=predicts and needed and choice.explains(pair, first))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -79,9 +80,8 @@ class Finding:
 
     def none(self, scores: Sequence[Score]) -> Discovery:
         """The noise explains everything."""
-        seen = self._held_out(self.space.likelihood, self.refined.fit.point.values)
         sentence = (
-            f"Nothing is missing that these recordings could show: held-out error {1e3 * seen:.2f} mm, "
+            f"Nothing is missing that these recordings could show: held-out error {1e3 * self._before:.2f} mm, "
             f"noise {1e3 * self._floor():.2f} mm."
         )
         tried = tuple(
@@ -187,14 +187,17 @@ class Finding:
         objects = max(len(self.simulator.cell.objects), 1)
         return float(np.sqrt(np.sum(self.noise.sigma**2) / objects))
 
+    @cached_property
+    def _before(self) -> float:
+        """The same for the simulator without effects."""
+        return self._held_out(self.space.likelihood, self.refined.fit.point.values)
+
     def _errors(self, joint: Joint) -> str:
-        before = self._held_out(self.space.likelihood, self.refined.fit.point.values)
-        return errors(before, self._held_out(joint.likelihood, joint.fit.point.values), self._floor())
+        return errors(self._before, self._held_out(joint.likelihood, joint.fit.point.values), self._floor())
 
     def _gain(self, joint: Joint) -> float:
-        before = self._held_out(self.space.likelihood, self.refined.fit.point.values)
         after, floor = self._held_out(joint.likelihood, joint.fit.point.values), self._floor()
-        return float(np.clip((before - after) / max(before - floor, 1e-9), -1.0, 1.0))
+        return float(np.clip((self._before - after) / max(self._before - floor, 1e-9), -1.0, 1.0))
 
     def _evidence(self, joint: Joint, choice: Choice) -> Evidence:
         kappa = self.noise.correlation_time
@@ -223,14 +226,15 @@ class Finding:
             parts = {o for a in joint.added for o in a.objects}
             return "" if not parts or parts >= set(movers) else f"on {' and '.join(sorted(parts))}: "
 
+        joints = ((choice.pair,) if choice.pair else ()) + choice.singles
         return tuple(
             Tried(
                 joint.name,
                 joint.added[0].effect.channel,
-                self._evidence(joint, choice).log_evidence,
-                self._gain(joint),
+                evidence.log_evidence,
+                evidence.held_out_gain,
                 chosen is not None and joint.added is chosen.added,
                 f"{on(joint)}explains {100 * choice.share(joint):.0f} % of the excess",
             )
-            for joint in ((choice.pair,) if choice.pair else ()) + choice.singles
+            for joint, evidence in ((joint, self._evidence(joint, choice)) for joint in joints)
         )

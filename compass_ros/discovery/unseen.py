@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from compass_ros.calibration.least_squares import (
     Fit,
@@ -15,7 +16,7 @@ from compass_ros.calibration.least_squares import (
     robust_weight,
 )
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import ROBUST, Refined, calmed, covariance
+from compass_ros.calibration.refine import ROBUST, Refined, calmed, covariance, fitted_launches
 from compass_ros.discovery.joint import Joint
 
 HELD_OUT_SHARE = 0.4
@@ -43,6 +44,11 @@ class HeldOut:
     """Surprise by noise alone."""
     _asked: dict[Joint, float] = field(default_factory=dict, repr=False)
 
+    @property
+    def excess(self) -> float:
+        """Surprise beyond that by noise alone."""
+        return self.before - self.floor
+
     def surprise(self, joint: Joint) -> float:
         """Minus the log predictive density of a fitted model; rolled out once for each."""
         if joint not in self._asked:
@@ -51,8 +57,7 @@ class HeldOut:
 
     def share(self, joint: Joint) -> float:
         """Part of the held-out excess that a model removes; 1 where there is none to speak of."""
-        excess = self.before - self.floor
-        return (self.before - self.surprise(joint)) / excess if excess > HELD_OUT_SEEN else 1.0
+        return (self.before - self.surprise(joint)) / self.excess if self.excess > HELD_OUT_SEEN else 1.0
 
     def remainder(self, joint: Joint) -> float:
         """Excess of chi-square that a model leaves in these episodes."""
@@ -60,8 +65,13 @@ class HeldOut:
 
     def helps(self, joint: Joint) -> bool:
         """Whether a model predicts these episodes better: clearly, where there is something to gain."""
-        excess, gain = self.before - self.floor, self.before - self.surprise(joint)
-        return gain > HELD_OUT_SHARE * excess if excess > HELD_OUT_SEEN else gain > -5.0
+        if self.excess > HELD_OUT_SEEN:
+            return self.share(joint) > HELD_OUT_SHARE
+        return self.before - self.surprise(joint) > -5.0
+
+    def beside(self, joint: Joint) -> HeldOut:
+        """The same episodes, with another model as the one to surpass."""
+        return replace(self, before=self.surprise(joint))
 
 
 def unexpected(judge: Likelihood, refined: Refined) -> bool:
@@ -78,8 +88,7 @@ def unexpected(judge: Likelihood, refined: Refined) -> bool:
 
 def held_out(judge: Likelihood, fitted: Likelihood, fit: Fit) -> HeldOut:
     """Weigh held-out episodes: frames that the parameters move too much are trusted less, as in the fit."""
-    point = Point(fit.point.values, np.zeros_like(judge.inputs), np.inf)
-    linear = linearise(judge, point, fit.free, difference_steps(fit.linear))
+    linear = linearise(judge, launched(judge, fit), fit.free, difference_steps(fit.linear))
     calm = calmed(judge, linear)
     floor = noise_cost(calm, replace(fit, free=np.zeros(0, dtype=np.int64)))
     return HeldOut(calm, surprise(calm, fitted, fit), floor)
@@ -89,23 +98,33 @@ def surprise(unseen: Likelihood, fitted: Likelihood, fit: Fit) -> float:
     """Minus the log predictive density of unseen episodes, up to a constant: noise and the fit's own uncertainty.
 
     A model that is unsure what its parameters are may be wrong about an episode without being refuted by it: the
-    residual has the covariance 1 + J C J', C that of the fitted parameters. Outliers are weighed down as in the fit.
+    residual has the covariance 1 + J C J', C that of the fitted parameters. Launches that the cell does not know are
+    as likely as the cell says, and the volume that they take, the same for every model, is left out. Outliers are
+    weighed down as in the fit.
     """
     judged = fitted.on(unseen)
-    point = Point(fit.point.values, np.zeros_like(unseen.inputs), np.inf)
+    point = launched(judged, fit)
     linear = linearise(judged, point, fit.free, difference_steps(fit.linear))
-    residual, jacobian = linear.residual.ravel(), linear.jacobian.reshape(-1, len(fit.free))
-    known = covariance(fitted, fit)[: len(fit.free), : len(fit.free)]
-    precision = np.linalg.inv(known)
+    p, random = len(fit.free), judged.launch_std > 0
+    own = block_diag(*linear.launch_jacobian.reshape(len(judged.inputs), judged.measured[0].size, -1))
+    residual, jacobian = linear.residual.ravel(), np.hstack([linear.jacobian.reshape(-1, p), own])
+    precision = np.eye(jacobian.shape[1])
+    precision[:p, :p] = np.linalg.inv(covariance(fitted, fit)[:p, :p])
+    away = np.concatenate([np.zeros(p), (point.launch[:, random] / judged.launch_std[random]).ravel()])
     left, weight = residual, np.ones_like(residual)
     for _ in range(3):
         weight = robust_weight(left, ROBUST)
         inner = precision + (jacobian * weight[:, None]).T @ jacobian
-        move = -np.linalg.solve(inner, jacobian.T @ (weight * residual))
+        move = -np.linalg.solve(inner, jacobian.T @ (weight * residual) + away)
         left = residual + jacobian @ move
     loss = 0.5 * float(np.sum(robust_loss(left, ROBUST)))
-    volume = np.linalg.slogdet(inner)[1] - np.linalg.slogdet(precision)[1]
-    return loss + 0.5 * float(move @ precision @ move) + 0.5 * float(volume)
+    volume = np.linalg.slogdet(inner)[1] - np.linalg.slogdet(inner[p:, p:])[1] - np.linalg.slogdet(precision)[1]
+    return loss + 0.5 * float((away + move) @ precision @ (away + move)) + 0.5 * float(volume)
+
+
+def launched(likelihood: Likelihood, fit: Fit) -> Point:
+    """A fit's parameters on other episodes, each with the launch that agrees best with it."""
+    return Point(fit.point.values, fitted_launches(likelihood, fit.point.values), np.inf)
 
 
 def noise_cost(likelihood: Likelihood, fit: Fit) -> float:

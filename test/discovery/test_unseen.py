@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import refine
+from compass_ros.cells import load
 from compass_ros.discovery.choose import Choice
-from compass_ros.discovery.unseen import held_out, unexpected
+from compass_ros.discovery.unseen import HELD_OUT_SEEN, held_out, unexpected
+from compass_ros.pipeline import pose
+from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
+from compass_ros.simulation.replay import Recordings
 from test.discovery.planted import HELD_OUT, PUCKS, joint, recorded, space_of
 from test.simulation.table import simulator
 
+PENDULUM = load(Path(__file__).parents[2] / "examples" / "own_cell" / "pendulum.yaml")
 DRAG = Attached(EFFECTS["viscous_drag"], PUCKS)
 
 
@@ -33,3 +43,29 @@ def test_what_predicts_only_a_part_helps_and_is_not_named() -> None:
     assert unseen.helps(half)
     assert choice.nameable(whole, unseen)
     assert not choice.nameable(half, unseen)
+
+
+def swings(numbers: tuple[float, ...], seed: int) -> Likelihood:
+    """Swings of the documentation's pendulum whose first states are known as its YAML says; with quadratic drag."""
+    rng = np.random.default_rng(seed)
+    effects = [Attached(EFFECTS["quadratic_drag"], ("swing",))] if numbers else []
+    plain = Simulator(PENDULUM, threads=1)
+    wider = plain.with_effects(effects)
+    times = np.tile(np.arange(180) / 60, (6, 1))
+    seen_at = np.column_stack([rng.uniform(-1.2, 1.2, 6), rng.uniform(-1, 1, 6)])
+    true = seen_at + rng.normal(0, 1, seen_at.shape) * PENDULUM.launch_std
+    measured = wider.observe(np.tile(np.concatenate([plain.defaults, numbers]), (6, 1)), true, times)
+    measured = measured + rng.normal(0, 0.001, measured.shape)
+    data = Recordings(tuple("abcdef"), seen_at, times, measured, times[0], measured, np.array([-np.inf]))
+    return pose(plain, data, Noise(np.array([0.001]), 0.0)).likelihood
+
+
+def test_first_states_that_nobody_knew_well_are_no_surprise() -> None:
+    refined = refine(swings((), 0), Simulator(PENDULUM, threads=1).defaults)
+    assert refined.chi_square < 1.2
+    fitted, fit = refined.likelihood, refined.fit
+    fine, dragged = (held_out(swings(numbers, 1), fitted, fit) for numbers in ((), (0.1,)))
+    assert abs(fine.excess) < HELD_OUT_SEEN
+    assert not unexpected(swings((), 1), refined)
+    assert dragged.excess > 20 * HELD_OUT_SEEN
+    assert unexpected(swings((0.1,), 1), refined)

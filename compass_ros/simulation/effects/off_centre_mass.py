@@ -13,11 +13,10 @@ from compass_ros.types import Floats
 
 
 def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
-    bodies = {model.body(i).name: i for i in range(model.nbody)}
     for name in context.objects:
-        if name not in bodies:
+        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+        if body < 0:
             raise ConfigError(f"off_centre_mass acts on bodies, '{name}' is a joint")
-        body = bodies[name]
         if model.body_simple[body] and numbers.any():
             raise ConfigError(
                 f"off_centre_mass cannot act on '{name}': MuJoCo has compiled it as centred for good; "
