@@ -206,6 +206,7 @@ def assemble(
         replays=drawn,
         cancelled=estimate.stop_reason.startswith("cancelled"),
         warnings=found.warnings,
+        unit=simulator.unit,
     )
 
 

@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+Unit = Literal["m", "rad"]
 Quantity = Literal["xy", "xyz", "pose", "joint"]
 """What one row of a track holds: planar position [m], position [m], position [m] + quaternion, joint position [rad or
 m]."""
@@ -303,3 +304,5 @@ class Result:
     replays: tuple[Replay, ...]
     cancelled: bool = False
     warnings: Sequence[str] = ()
+    unit: Unit = "m"
+    """Of gap and noise floor."""

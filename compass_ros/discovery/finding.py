@@ -80,9 +80,10 @@ class Finding:
 
     def none(self, scores: Sequence[Score]) -> Discovery:
         """The noise explains everything."""
+        unit = f"m{self.simulator.unit}"
         sentence = (
-            f"Nothing is missing that these recordings could show: held-out error {1e3 * self._before:.2f} mm, "
-            f"noise {1e3 * self._floor():.2f} mm."
+            f"Nothing is missing that these recordings could show: held-out error {1e3 * self._before:.2f} {unit}, "
+            f"noise {1e3 * self._floor():.2f} {unit}."
         )
         tried = tuple(
             Tried(s.candidate.name, s.candidate.attached.effect.channel, s.gain, 0.0, False, "within the noise")
@@ -193,7 +194,8 @@ class Finding:
         return self._held_out(self.space.likelihood, self.refined.fit.point.values)
 
     def _errors(self, joint: Joint) -> str:
-        return errors(self._before, self._held_out(joint.likelihood, joint.fit.point.values), self._floor())
+        after = self._held_out(joint.likelihood, joint.fit.point.values)
+        return errors(self._before, after, self._floor(), self.simulator.unit)
 
     def _gain(self, joint: Joint) -> float:
         after, floor = self._held_out(joint.likelihood, joint.fit.point.values), self._floor()

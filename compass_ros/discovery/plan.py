@@ -184,10 +184,13 @@ def objections(cell: Cell, inputs: Floats, rate_hz: float) -> tuple[str, ...]:
     out = []
     if rate_hz < SLOW_HZ:
         out.append(f"{rate_hz:.3g} frames a second are few; {SLOW_HZ:g} or more show contacts")
+    shots = "shots" if cell.action else "episodes"
     if len(inputs) < REFUSED_SHOTS:
-        raise DataError(f"{len(inputs)} shots are too few: expected {REFUSED_SHOTS} or more, better {FEW_SHOTS}")
+        raise DataError(f"{len(inputs)} {shots} are too few: expected {REFUSED_SHOTS} or more, better {FEW_SHOTS}")
     if len(inputs) < FEW_SHOTS:
-        out.append(f"{len(inputs)} shots are few: with less than {FEW_SHOTS} hardly any is left to check a verdict on")
+        out.append(
+            f"{len(inputs)} {shots} are few: with less than {FEW_SHOTS} hardly any is left to check a verdict on"
+        )
     out.extend(_alike(cell, inputs))
     return tuple(out)
 

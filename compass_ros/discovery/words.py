@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from compass_ros.simulation.effects import Attached
-from compass_ros.types import Channel, EffectFinding, Floats, Phase, Region, Where
+from compass_ros.types import Channel, EffectFinding, Floats, Phase, Region, Unit, Where
 
 PHASE: dict[str, Phase] = {
     "rate_dependent_restitution": "all",
@@ -58,6 +58,6 @@ def value_of(finding: EffectFinding) -> str:
     return f"{finding.name}, {name} {first.value:.3g} +- {first.std:.1g}{unit}"
 
 
-def errors(before: float, after: float, floor: float) -> str:
-    """Held-out errors in millimetres."""
-    return f"held-out error {1e3 * before:.2f} -> {1e3 * after:.2f} mm, floor {1e3 * floor:.2f} mm"
+def errors(before: float, after: float, floor: float, unit: Unit) -> str:
+    """Held-out errors in thousandths of the unit."""
+    return f"held-out error {1e3 * before:.2f} -> {1e3 * after:.2f} m{unit}, floor {1e3 * floor:.2f} m{unit}"

@@ -26,7 +26,7 @@ from compass_ros.simulation.native.program import (
     path_columns,
     slides_or_turns,
 )
-from compass_ros.types import QUANTITY_SIZE, Floats, Ints, Parameter
+from compass_ros.types import QUANTITY_SIZE, Floats, Ints, Parameter, Unit
 
 CHUNK = 128
 """Rollouts held in memory at once; 128 of 2.5 s at 1 ms take 45 MB."""
@@ -119,6 +119,13 @@ class Simulator:
     def actuated(self) -> bool:
         """Whether the cell moves anything by commands."""
         return bool(self._model.nu)
+
+    @property
+    def unit(self) -> Unit:
+        """Of a distance between two states: rad where all that is tracked are hinges."""
+        tracked = [spec.body or spec.name for spec in self.cell.objects if spec.quantity == "joint"]
+        hinges = [name for name in tracked if self._model.joint(name).type[0] == mujoco.mjtJoint.mjJNT_HINGE]
+        return "rad" if len(hinges) == len(self.cell.objects) else "m"
 
     def movers(self) -> tuple[str, ...]:
         """Tracked bodies that slide in the plane and tracked joints: what a force along the way can act on."""

@@ -51,7 +51,7 @@ def test_nothing_is_missing_and_the_sentence_says_what_the_table_says() -> None:
     result, _ = calibrate(episodes(), CELL, calibration_config({}))
     assert result.mismatch.verdict == "none"
     held_out = result.gap["calibrated"]["held_out"].rmse_m
-    assert f"held-out error {1e3 * held_out:.2f} mm" in result.mismatch.sentence
+    assert f"held-out error {1e3 * held_out:.2f} mrad" in result.mismatch.sentence
 
 
 def test_every_effect_says_whether_it_can_act_on_a_joint_that_no_body_is_named_after() -> None:
