@@ -11,7 +11,7 @@ import numpy as np
 from compass_ros.episodes.bag import RawMessage, RawTopic, decode, is_bag, scan
 from compass_ros.episodes.definitions import EPISODE_TYPE, SHOT_TYPE, STRING_TYPE
 from compass_ros.episodes.notes import NOTES_TOPIC, SHOT_TOPIC, EpisodeHeader, Notes, Shot, header, notes, shot
-from compass_ros.episodes.sources import KNOWN_TYPES, Row, Source, rows
+from compass_ros.episodes.sources import KNOWN_TYPES, Row, Source, entries, rows
 from compass_ros.errors import BagError, nearest
 from compass_ros.types import Episode, Floats, Track
 
@@ -113,6 +113,8 @@ class _Content:
         self.counts: dict[RawTopic, int] = {}
         self.headers: list[EpisodeHeader] = []
         self.shots: list[tuple[str, Shot]] = []
+        self.others: dict[Source, set[str]] = {}
+        """Joints or frames of messages on a source's topic that do not hold it."""
         self.notes = Notes()
         self._by_topic: dict[str, list[Source]] = {}
         self._types: dict[str, str] = {}
@@ -134,7 +136,11 @@ class _Content:
                 raise BagError(f"{topic.name} changes from {self._types[topic.name]} to {topic.type} in this bag")
             if topic.type not in KNOWN_TYPES:
                 raise BagError(f"{topic.name} is a {topic.type}; expected one of {', '.join(sorted(KNOWN_TYPES))}")
-            self.tracks[source] += rows(decode(message), topic.type, source)
+            decoded = decode(message)
+            found = list(rows(decoded, topic.type, source))
+            if not found:
+                self.others.setdefault(source, set()).update(entries(decoded, topic.type))
+            self.tracks[source] += found
 
 
 def _episode(path: Path, content: _Content, cell: str, cell_hash: str) -> Episode:
@@ -171,7 +177,7 @@ def _fired(shots: Sequence[tuple[str, Shot]], head: EpisodeHeader) -> Shot | Non
 
 def _track(source: Source, found: Sequence[Row], content: _Content) -> Track:
     if not found:
-        raise BagError(_no_messages(source, content.counts))
+        raise BagError(_no_messages(source, content))
     once = [row for index, row in enumerate(found) if index == 0 or row != found[index - 1]]
     stamps = np.array([row.stamp_ns for row in once], np.int64)
     values = np.array([row.value for row in once], float)
@@ -206,13 +212,19 @@ def _finite(values: Floats, source: Source, what: str) -> Floats:
     return values
 
 
-def _no_messages(source: Source, counts: Mapping[RawTopic, int]) -> str:
-    names = sorted({topic.name for topic in counts})
+def _no_messages(source: Source, content: _Content) -> str:
+    names = sorted({topic.name for topic in content.counts})
     if source.topic in names:
-        what = f" of '{source.entry or source.object}'" if source.entry or source.quantity == "joint" else ""
-        return f"no messages{what} on {source.topic} ({source.object} was never seen)"
-    known = f"it has {', '.join(names[:12])}{', ...' * (len(names) > 12)}" if names else "it has no topics"
+        wanted, others = source.entry or source.object, sorted(content.others.get(source, ()))
+        what = f" of '{wanted}'" if source.entry or source.quantity == "joint" else ""
+        there = f"; there are {_some(others)}{nearest(wanted, others)}" if others else ""
+        return f"no messages{what} on {source.topic} ({source.object} was never seen){there}"
+    known = f"it has {_some(names)}" if names else "it has no topics"
     return f"no topic {source.topic} for {source.object}; {known}{nearest(source.topic, names)}"
+
+
+def _some(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:12])}{', ...' * (len(names) > 12)}"
 
 
 def _count(counts: dict[RawTopic, int], item: RawTopic | RawMessage) -> None:

@@ -70,6 +70,11 @@ def rows(message: object, type_name: str, source: Source) -> Iterator[Row]:
             yield Row(found.stamp_ns, _value(found, type_name, source), found.std)
 
 
+def entries(message: object, type_name: str) -> set[str]:
+    """What a message that holds several things calls them: joints, frames."""
+    return {found.entry for found in _MEASUREMENTS[type_name](message) if found.entry}
+
+
 def _value(found: _Measurement, type_name: str, source: Source) -> tuple[float, ...]:
     if source.quantity == "joint" and found.joint is not None:
         return (found.joint,)

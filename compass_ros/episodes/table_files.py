@@ -28,11 +28,11 @@ class Table:
     columns: Mapping[str, Floats]
     """(F,) by name; columns of arrays are numbered `0`, `1`, ..., after the array's name where there are several."""
 
-    def column(self, name: str) -> Floats:
-        """Raises DataError with the columns that there are."""
+    def column(self, name: str, asked: str) -> Floats:
+        """Raises DataError with the place where it is asked for and the columns that there are."""
         if name not in self.columns:
             known = ", ".join(list(self.columns)[:20])
-            raise DataError(f"no column '{name}'; there are {known}{nearest(name, self.columns)}")
+            raise DataError(f"{asked}: no column '{name}'; there are {known}{nearest(name, self.columns)}")
         return self.columns[name]
 
 

@@ -138,7 +138,8 @@ def _find(name: str, roots: Sequence[Path], path: Path) -> list[Path]:
         found = [f for f in folder.iterdir() if fnmatchcase(f.name, pure.name)] if folder.is_dir() else []
         if found:
             return sorted(found)
-    raise DataError(f"{path}: no file {name} in {' or '.join(str(root) for root in roots)}; set {DATA_VARIABLE}")
+    looked = " or ".join(str(root) for root in roots)
+    raise DataError(f"{path}: no file {name} in {looked}; name its folder with --data or {DATA_VARIABLE}")
 
 
 def _episodes(config: ImportConfig, recordings: Recordings, files: Sequence[Path]) -> list[Episode]:
@@ -162,11 +163,12 @@ def _episode(config: ImportConfig, recordings: Recordings, file: Path, table: Ta
     try:
         stamps = _stamps(config.time, table)
         tracks = tuple(_track(target, columns, stamps, table) for target, columns in config.tracks.items())
-        initial = {target: tuple(_rows(columns, table)[0].tolist()) for target, columns in config.initial_state.items()}
-        action = {target: float(_rows(columns, table)[0, 0]) for target, columns in config.action.items()}
+        initial = {t: tuple(_rows(c, table, f"initial_state.{t}")[0].tolist()) for t, c in config.initial_state.items()}
+        action = {t: float(_rows(c, table, f"action.{t}")[0, 0]) for t, c in config.action.items()}
         return Episode(episode_name(name), config.cell, "", action, int(stamps[0]), tracks, initial)
     except (DataError, BagError) as error:
-        raise DataError(f"{file}: {name}: {error}") from error
+        where = str(file) if name == file.stem else f"{file}: {name}"
+        raise DataError(f"{where}: {error}") from error
 
 
 def _filled(template: str, table: Table) -> str:
@@ -183,7 +185,8 @@ def _filled(template: str, table: Table) -> str:
 def _stamps(time: TimeColumn, table: Table) -> Ints:
     rows = len(next(iter(table.columns.values())))
     if time.column:
-        since = (table.column(time.column) - table.column(time.column)[0]) * time.unit_s
+        column = table.column(time.column, "time")
+        since = (column - column[0]) * time.unit_s
     elif time.rate_hz > 0:
         since = np.arange(rows) / time.rate_hz
     else:
@@ -198,23 +201,24 @@ def _track(target: str, columns: TrackColumns, stamps: Ints, table: Table) -> Tr
     size = QUANTITY_SIZE[columns.quantity]
     if len(columns.columns) != size:
         raise DataError(f"{target}: expected {size} columns for '{columns.quantity}', found {len(columns.columns)}")
-    values = _rows(columns, table)
+    values = _rows(columns, table, f"tracks.{target}")
     if not np.isfinite(values).all():
         raise DataError(f"{target}: not finite in row {int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0]) + 1}")
     std = np.full(len(stamps), columns.std) if columns.std else None
     return Track(target, columns.quantity, stamps, values, std)
 
 
-def _rows(numbers: Numbers, table: Table) -> Floats:
-    """(F, columns) SI numbers."""
+def _rows(numbers: Numbers, table: Table, where: str) -> Floats:
+    """(F, columns) SI numbers. Raises DataError that says where in the YAML they are asked for."""
     scale = np.array(numbers.scale or (1.0,))
     offset = np.array(numbers.offset or (0.0,))
     for name, given in (("scale", scale), ("offset", offset), ("minus", np.array(numbers.minus or (None,)))):
         if len(given) not in (1, len(numbers.columns)):
-            raise DataError(f"{name}: expected 1 or {len(numbers.columns)} entries, found {len(given)}")
-    return np.asarray((_stack(numbers.columns, table) - _stack(numbers.minus or (None,), table)) * scale + offset)
+            raise DataError(f"{where}.{name}: expected 1 or {len(numbers.columns)} entries, found {len(given)}")
+    values, minus = _stack(numbers.columns, table, where), _stack(numbers.minus or (None,), table, where)
+    return np.asarray((values - minus) * scale + offset)
 
 
-def _stack(names: Sequence[str | int | None], table: Table) -> Floats:
+def _stack(names: Sequence[str | int | None], table: Table, where: str) -> Floats:
     zeros = np.zeros(len(next(iter(table.columns.values()))))
-    return np.stack([zeros if name is None else table.column(str(name)) for name in names], axis=1)
+    return np.stack([zeros if name is None else table.column(str(name), where) for name in names], axis=1)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from compass_ros.reporting.numbers import millimetres, probability
+from compass_ros.reporting.numbers import probability, with_unit
 from compass_ros.reporting.words import (
     VERDICT_LEVEL,
     VERDICT_MEANING,
@@ -80,11 +80,11 @@ def _floor(result: Result) -> Iterator[Check]:
     if not math.isfinite(error):
         return
     if not (math.isfinite(floor) and floor > 0):
-        text = f"Held-out error {millimetres(error)} mm; how low it could be is unknown."
+        text = f"Held-out error {with_unit(error, result.unit)}; how low it could be is unknown."
         yield Check("care", "Noise floor unknown", text)
         return
-    ratio = error / floor
-    numbers = f"Held-out error {millimetres(error)} mm, {ratio:.1f} times the noise floor of {millimetres(floor)} mm."
+    ratio, said = error / floor, with_unit(floor, result.unit)
+    numbers = f"Held-out error {with_unit(error, result.unit)}, {ratio:.1f} times the noise floor of {said}."
     if ratio <= AT_FLOOR:
         yield Check("good", "At the noise floor", f"{numbers} Better is not possible with these recordings.")
     elif ratio <= NEAR_FLOOR:
@@ -98,7 +98,8 @@ def _improvement(result: Result) -> Iterator[Check]:
     if not (math.isfinite(before) and math.isfinite(after) and before > 0):
         return
     ratio = after / before
-    numbers = f"{millimetres(before)} mm with the default parameters, {millimetres(after)} mm now; held-out episodes."
+    errors = [with_unit(error, result.unit) for error in (before, after)]
+    numbers = f"{errors[0]} with the default parameters, {errors[1]} now; held-out episodes."
     if ratio <= SMALLER:
         yield Check("good", f"{1 / max(ratio, 1e-9):.0f} times closer than before", numbers)
     elif before <= AT_FLOOR * result.noise_floor_m:
@@ -112,7 +113,8 @@ def _carries_over(result: Result) -> Iterator[Check]:
     fitted, held_out = fit_rmse(result, model), held_out_rmse(result, model)
     if not (math.isfinite(fitted) and math.isfinite(held_out) and fitted > 0):
         return
-    numbers = f"{millimetres(fitted)} mm on fitted episodes, {millimetres(held_out)} mm on held-out ones."
+    errors = [with_unit(error, result.unit) for error in (fitted, held_out)]
+    numbers = f"{errors[0]} on fitted episodes, {errors[1]} on held-out ones."
     if held_out <= OVERFIT * fitted:
         yield Check("good", "Carries over to new episodes", numbers)
     else:

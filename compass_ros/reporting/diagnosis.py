@@ -12,7 +12,7 @@ from rich.text import Text
 
 from compass_ros.reporting.checks import SUMMARY, assess, overall
 from compass_ros.reporting.extras import ReportExtras, ResidualMap
-from compass_ros.reporting.numbers import MINUS, millimetres, percent, plain, probability, unit_text, value_pm
+from compass_ros.reporting.numbers import MINUS, percent, plain, probability, unit_text, value_pm, with_unit
 from compass_ros.reporting.residuals import error_curves, left_over
 from compass_ros.reporting.table import STYLE, gap_table, parameter_table
 from compass_ros.reporting.view.missing import ranking
@@ -93,8 +93,8 @@ def _curves(result: Result) -> Iterator[Text]:
     low = min(max(floor, largest * 1e-3), largest * 0.5)
     end = max(float(c.time_s[-1]) for c in curves)
     yield Text(
-        f"Error over the {end:.1f} s of a shot, {BARS[0]} {millimetres(low)} mm and less, "
-        f"{BARS[-1]} {millimetres(largest)} mm, logarithmic:"
+        f"Error over the {end:.1f} s of a shot, {BARS[0]} {with_unit(low, result.unit)} and less, "
+        f"{BARS[-1]} {with_unit(largest, result.unit)}, logarithmic:"
     )
     width = max(len(c.object) for c in curves)
     for curve in curves:

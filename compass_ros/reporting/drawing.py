@@ -172,6 +172,7 @@ def figure_data(result: Result, extras: ReportExtras) -> dict[str, Any]:
     region = where.region if where is not None else None
     return {
         "models": [{"key": m, "label": MODEL_LABEL[m]} for m in MODELS if m in result.gap],
+        "unit": f"m{result.unit}",
         "floor_mm": result.noise_floor_m * 1e3 if math.isfinite(result.noise_floor_m) else None,
         "axes": ["xyz"[axis] for axis in axes],
         "scene": _scene(extras.scene),

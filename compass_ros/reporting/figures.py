@@ -16,7 +16,7 @@ from matplotlib.patches import Circle, Patch, Rectangle
 
 from compass_ros.reporting.drawing import plane
 from compass_ros.reporting.extras import Scene, Shape
-from compass_ros.reporting.numbers import millimetres
+from compass_ros.reporting.numbers import with_unit
 from compass_ros.reporting.palette import LIGHT
 from compass_ros.reporting.words import MODEL_LABEL, MODELS, Model, held_out_rmse
 from compass_ros.types import Floats, Graph, Replay, ReplayedTrack, Result
@@ -160,7 +160,7 @@ def gap_bars(result: Result) -> Figure:
             axes.plot([start, error], [place, place], color=LIGHT[model], alpha=0.35, lw=3)
             axes.plot(error, place, "o", color=LIGHT[model], ms=7)
             beside: dict[str, Any] = {"textcoords": "offset points", "va": "center", "weight": "bold"}
-            axes.annotate(f"{millimetres(error / 1e3)} mm", (error, place), (8, 0), **beside)
+            axes.annotate(with_unit(error / 1e3, result.unit), (error, place), (8, 0), **beside)
         if math.isfinite(floor):
             axes.axvline(floor, color=LIGHT["faint"], ls=":", lw=1.5)
         axes.set_xscale("log")
@@ -168,6 +168,6 @@ def gap_bars(result: Result) -> Figure:
         axes.set_yticks(range(len(models)), [MODEL_LABEL[m] for m in models])
         axes.set_ylim(len(models) - 0.5, -0.5)
         axes.margins(x=0.15)
-        axes.set_xlabel("held-out error, rms [mm]; dotted: noise floor")
+        axes.set_xlabel(f"held-out error, rms [m{result.unit}]; dotted: noise floor")
         axes.xaxis.set_major_formatter("{x:g}")
     return figure

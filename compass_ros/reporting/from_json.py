@@ -41,6 +41,7 @@ def from_json(content: Json) -> Result:
         held_out=tuple(content["episodes"]["held_out"]),
         gap={model: _gaps(gap[model]) for model in MODELS if gap[model] is not None},
         noise_floor_m=_number(gap["noise_floor_m"]),
+        unit=gap.get("unit", "m"),
         parameters=tuple(_parameter(row) for row in content["parameters"]),
         graph=Graph(
             tuple(graph["parameters"]),

@@ -63,7 +63,7 @@ def error_over_time(result: Result) -> Figure:
             if math.isfinite(result.noise_floor_m):
                 axes.axhline(result.noise_floor_m * 1e3, color=LIGHT["faint"], ls=":", lw=1)
             axes.set_yscale("log")
-            axes.set_ylabel("error [mm]")
+            axes.set_ylabel(f"error [m{result.unit}]")
         figure.supxlabel("time after the command [s]", fontsize=8, color=LIGHT["soft"])
         figure.legend(loc="outside upper right", ncols=3)
     return figure

@@ -38,12 +38,17 @@ def value_pm(value: float, std: float) -> str:
     return f"{text} ± {error}" if error else text
 
 
-def millimetres(metres: float) -> str:
-    """A distance in mm without its unit: three digits at most."""
-    if not math.isfinite(metres):
+def thousandths(distance: float) -> str:
+    """A distance in mm (mrad) without its unit: three digits at most."""
+    if not math.isfinite(distance):
         return MISSING
-    value = metres * 1e3
+    value = distance * 1e3
     return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}"
+
+
+def with_unit(distance: float, unit: str) -> str:
+    """`5.10 mm`, from metres; `5.10 mrad`, from radians."""
+    return f"{thousandths(distance)} m{unit}"
 
 
 def percent(share: float) -> str:

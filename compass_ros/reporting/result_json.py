@@ -113,6 +113,7 @@ def to_json(result: Result) -> dict[str, Any]:
         parts = result.gap.get(model)
         gap[model] = None if parts is None else {name: _gap(parts.get(name)) for name in ("fit", "held_out")}
     gap["noise_floor_m"] = _number(result.noise_floor_m)
+    gap["unit"] = result.unit
     return {
         "schema": SCHEMA_ID,
         "cell": result.cell,

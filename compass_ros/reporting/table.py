@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from compass_ros.reporting.checks import SUMMARY, assess, overall
-from compass_ros.reporting.numbers import MISSING, millimetres, plain, unit_text, value_pm
+from compass_ros.reporting.numbers import MISSING, plain, thousandths, unit_text, value_pm, with_unit
 from compass_ros.reporting.words import (
     MODEL_LABEL,
     MODELS,
@@ -85,16 +85,16 @@ def _found(row: ParameterRow) -> Text:
 
 def gap_table(result: Result) -> Table:
     """Root mean square distance of each model, and its ratio to the nominal one and to the noise floor."""
-    floor = result.noise_floor_m
-    table = Table(caption=Text(f"noise floor {millimetres(floor)} mm", "dim"), caption_justify="left", **NARROW)
-    for heading in ("simulator", "held out [mm]", "of nominal", "of floor", "fitted [mm]"):
+    floor, unit = result.noise_floor_m, f"m{result.unit}"
+    table = Table(caption=Text(f"noise floor {with_unit(floor, result.unit)}", "dim"), caption_justify="left", **NARROW)
+    for heading in ("simulator", f"held out [{unit}]", "of nominal", "of floor", f"fitted [{unit}]"):
         table.add_column(Text(heading), justify="left" if heading == "simulator" else "right")
     nominal = held_out_rmse(result, "nominal")
     for model in MODELS:
         if model in result.gap:
             error = held_out_rmse(result, model)
             ratios = [_ratio(error, nominal), _ratio(error, floor)]
-            table.add_row(MODEL_LABEL[model], millimetres(error), *ratios, millimetres(fit_rmse(result, model)))
+            table.add_row(MODEL_LABEL[model], thousandths(error), *ratios, thousandths(fit_rmse(result, model)))
     return table
 
 

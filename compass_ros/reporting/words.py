@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal
 
-from compass_ros.reporting.numbers import MINUS, millimetres
+from compass_ros.reporting.numbers import MINUS, with_unit
 from compass_ros.types import Phase, Result, Verdict, Where
 
 Level = Literal["good", "note", "care", "bad"]
@@ -86,11 +86,11 @@ def fit_rmse(result: Result, model: Model) -> float:
 def gap_line(result: Result) -> str:
     """`held-out error 51 mm nominal -> 5.1 mm calibrated -> 1.2 mm with effects; noise floor 1.0 mm`."""
     steps = [
-        f"{millimetres(held_out_rmse(result, model))} mm {MODEL_LABEL[model]}"
+        f"{with_unit(held_out_rmse(result, model), result.unit)} {MODEL_LABEL[model]}"
         for model in MODELS
         if model in result.gap
     ]
-    return f"held-out error {' → '.join(steps)}; noise floor {millimetres(result.noise_floor_m)} mm"
+    return f"held-out error {' → '.join(steps)}; noise floor {with_unit(result.noise_floor_m, result.unit)}"
 
 
 def where_rows(where: Where) -> tuple[tuple[str, str], ...]:

@@ -14,8 +14,10 @@ from rich.console import Console
 
 from compass_ros.reporting import ReportExtras, ResidualMap
 from compass_ros.reporting.diagnosis import BARS, SHADES, print_diagnosis
+from compass_ros.reporting.extras import Candidate
 from compass_ros.reporting.gallery import worst_replay, write_figures
 from compass_ros.reporting.residuals import error_curves
+from compass_ros.reporting.view.missing import ranking
 from compass_ros.types import Replay, ReplayedTrack, Result, Verdict
 
 
@@ -24,6 +26,13 @@ def printed(result: Result, extras: ReportExtras) -> str:
     print_diagnosis(result, extras, console)
     assert isinstance(console.file, io.StringIO)
     return console.file.getvalue()
+
+
+def test_candidates_that_read_alike_are_one_line(result: Result) -> None:
+    alike = [Candidate("magnet", "dynamics", gain, 0.0, False, "within the noise") for gain in (5.0, 9.0)]
+    other = Candidate("table_tilt", "dynamics", 7.0, 0.0, False, "within the noise")
+    rows = ranking(result, (*alike, other))
+    assert [(row["name"], row["evidence"]) for row in rows] == [("magnet", "9"), ("table_tilt", "7")]
 
 
 def late(episode: str, held_out: bool, error_m: float) -> Replay:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from compass_ros.reporting.numbers import MINUS, MISSING, duration, millimetres, plain, probability, typeset, value_pm
+from compass_ros.reporting.numbers import MINUS, MISSING, duration, plain, probability, thousandths, typeset, value_pm
 
 NAN = float("nan")
 
@@ -28,8 +28,8 @@ def test_value_pm(value: float, std: float, text: str) -> None:
 @pytest.mark.parametrize(
     ("metres", "text"), [(0.183, "183"), (0.0196, "19.6"), (0.00104, "1.04"), (0.00043, "0.43"), (NAN, MISSING)]
 )
-def test_millimetres(metres: float, text: str) -> None:
-    assert millimetres(metres) == text
+def test_thousandths(metres: float, text: str) -> None:
+    assert thousandths(metres) == text
 
 
 @pytest.mark.parametrize(

@@ -129,6 +129,7 @@ def test_what_is_not_finite_or_not_there_is_null(result: Result) -> None:
         "calibrated": None,
         "with_effects": None,
         "noise_floor_m": None,
+        "unit": "m",
     }
     assert content["graph"]["sparsity"] is None
     json.dumps(content, allow_nan=False)

@@ -39,6 +39,13 @@ def test_parameters_gap_and_verdict(result: Result, extras: ReportExtras) -> Non
     assert "held out [mm]" in text
 
 
+def test_a_cell_of_hinges_has_its_errors_in_mrad(result: Result) -> None:
+    text = printed(replace(result, unit="rad"))
+    assert "noise floor 1.01 mrad" in text
+    assert "held out [mrad]" in text
+    assert "fitted [mrad]" in text
+
+
 def test_eighty_columns_hold_every_name(result: Result, extras: ReportExtras) -> None:
     text = printed(result, dict(extras.truth), width=80)
     assert all(row.name in text for row in result.parameters if row.active)

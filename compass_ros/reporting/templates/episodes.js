@@ -53,13 +53,13 @@ const drawErrors = () => {
     const n = i ? i + 1 : "", gap = 0.09 / rows;
     axes[`yaxis${n}`] = axis({
       type: "log", range: [-1, Math.log10(top) + 0.15], domain: [1 - (i + 1) / rows + (i < rows - 1 ? gap : 0), 1 - i / rows - gap],
-      title: label("mm"), tickvals: [0.1, 1, 10, 100, 1000], ticktext: ["0.1", "1", "10", "100", "1000"],
+      title: label(data.unit), tickvals: [0.1, 1, 10, 100, 1000], ticktext: ["0.1", "1", "10", "100", "1000"],
     });
     for (const model of data.models.filter((m) => shown[m.key] && track.error_mm[m.key])) {
       const style = STYLE[model.key];
       traces.push({
         x: track.time, y: track.error_mm[model.key].map((e) => (e === null ? null : Math.max(e, 0.05))), yaxis: `y${n}`, type: "scatter", mode: "lines", name: model.label,
-        line: { color: colour(model.key), width: style.width - 0.3, dash: style.dash }, hovertemplate: `%{y:.2f} mm ${model.label}<extra></extra>`,
+        line: { color: colour(model.key), width: style.width - 0.3, dash: style.dash }, hovertemplate: `%{y:.2f} ${data.unit} ${model.label}<extra></extra>`,
       });
     }
     if (data.floor_mm) shapes.push({ type: "line", xref: "paper", x0: 0, x1: 1, yref: `y${n}`, y0: data.floor_mm, y1: data.floor_mm, line: { color: colour("faint"), width: 1.2, dash: "dot" } });

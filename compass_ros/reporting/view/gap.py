@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from compass_ros.reporting.drawing import MAX_REPLAYS, chosen, episode_rmse
-from compass_ros.reporting.numbers import millimetres, plain
+from compass_ros.reporting.numbers import plain, thousandths
 from compass_ros.reporting.words import MODEL_LABEL, MODELS, best_model, fit_rmse, held_out_rmse
 from compass_ros.types import Result
 
@@ -28,10 +28,10 @@ class LogScale:
             return None
         return round(100 * (math.log10(value) - self.low) / (self.high - self.low), 2)
 
-    def ticks(self) -> list[tuple[float, str]]:
-        """(place, label in mm) of the powers of ten in range."""
+    def ticks(self, unit: str) -> list[tuple[float, str]]:
+        """(place, label in thousandths of the unit) of the powers of ten in range."""
         powers = range(math.ceil(self.low), math.floor(self.high) + 1)
-        return [(self.place(10.0**p) or 0.0, f"{10.0 ** (p + 3):g} mm") for p in powers]
+        return [(self.place(10.0**p) or 0.0, f"{10.0 ** (p + 3):g} m{unit}") for p in powers]
 
 
 def ladder(result: Result) -> dict[str, Any]:
@@ -46,16 +46,16 @@ def ladder(result: Result) -> dict[str, Any]:
                 "key": model,
                 "label": MODEL_LABEL[model],
                 "place": scale.place(error),
-                "text": millimetres(error),
-                "fit": millimetres(fit_rmse(result, model)),
+                "text": thousandths(error),
+                "fit": thousandths(fit_rmse(result, model)),
                 "times": _times(error / result.noise_floor_m) if result.noise_floor_m > 0 else "",
             }
         )
     return {
         "rows": rows,
-        "ticks": scale.ticks(),
+        "ticks": scale.ticks(result.unit),
         "floor": scale.place(result.noise_floor_m),
-        "floor_text": millimetres(result.noise_floor_m),
+        "floor_text": thousandths(result.noise_floor_m),
     }
 
 
@@ -90,9 +90,10 @@ def episodes(result: Result) -> dict[str, Any]:
             "dots": [
                 {"key": m, "place": scale.place(errors[i, m])} for m in MODELS if scale.place(errors[i, m]) is not None
             ],
-            "text": millimetres(errors[i, best]),
+            "text": thousandths(errors[i, best]),
         }
         for i, replay in enumerate(replays)
     ]
     left_out = max(len(result.replays) - MAX_REPLAYS, 0)
-    return {"rows": rows, "ticks": scale.ticks(), "floor": scale.place(result.noise_floor_m), "left_out": left_out}
+    ticks, floor = scale.ticks(result.unit), scale.place(result.noise_floor_m)
+    return {"rows": rows, "ticks": ticks, "floor": floor, "left_out": left_out}

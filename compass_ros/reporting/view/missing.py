@@ -27,11 +27,17 @@ def effect(finding: EffectFinding) -> dict[str, Any]:
 
 
 def ranking(result: Result, candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
-    """Candidates by evidence, best first; from the findings alone where discovery handed over no list."""
+    """Candidates by evidence, best first; from the findings alone where discovery handed over no list.
+
+    One effect on other objects is another candidate: of those that read alike the best stands for all.
+    """
     rows = candidates or tuple(
         Candidate(e.name, "", e.evidence.log_evidence, e.evidence.held_out_gain, True) for e in result.mismatch.effects
     )
     ordered = sorted(rows, key=lambda c: (-c.log_evidence if math.isfinite(c.log_evidence) else math.inf, c.name))
+    unlike: dict[tuple[str, str], Candidate] = {}
+    for c in ordered:
+        unlike.setdefault((c.name, c.note), c)
     top = max((c.log_evidence for c in ordered if math.isfinite(c.log_evidence)), default=0.0)
     return [
         {
@@ -43,5 +49,5 @@ def ranking(result: Result, candidates: Sequence[Candidate]) -> list[dict[str, A
             "kept": c.kept,
             "note": c.note,
         }
-        for c in ordered
+        for c in unlike.values()
     ]
