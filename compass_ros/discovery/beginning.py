@@ -103,15 +103,16 @@ def _begun(simulator: Simulator, beginning: Beginning, candidate: Candidate) -> 
 
 
 def _sizes(quantities: Sequence[Quantity]) -> list[Floats]:
-    """(q,) settings to begin with: none, and each quantity alone, small and large. Some act beyond a limit only."""
+    """(q,) settings to begin with: none, and each amplitude alone, small and large. Some act beyond a limit only."""
+    none = np.array([q.start for q in quantities])
     sizes = [
-        np.where(np.arange(len(quantities)) == i, sign * size * q.scale, 0.0)
+        np.where(np.arange(len(quantities)) == i, sign * size * q.scale, none)
         for i, q in enumerate(quantities)
         for size in SIZES
         for sign in (1.0, -1.0)
-        if q.low <= sign * size * q.scale <= q.high
+        if q.amplitude and q.low <= sign * size * q.scale <= q.high
     ]
-    return [np.zeros(len(quantities)), *sizes]
+    return [none, *sizes]
 
 
 def _freed(joint: Joint, beginning: Beginning) -> Joint:

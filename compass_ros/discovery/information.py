@@ -108,7 +108,7 @@ def _cases(space: Space, candidate: Candidate) -> Iterator[tuple[list[Quantity],
     """Amplitudes of each case with their (D, n) tangents per unit."""
     quantities = candidate.attached.effect.quantities
     if not candidate.by_force:
-        yield list(quantities), differences(space, candidate)
+        yield [q for q in quantities if q.amplitude], differences(space, candidate)
         return
     amplitudes = [i for i, q in enumerate(quantities) if q.amplitude]
     units = np.diag([q.scale for q in quantities])[amplitudes]

@@ -38,15 +38,18 @@ def score(space: Space, candidate: Candidate) -> Score:
 def _score_rolled_out(space: Space, candidate: Candidate) -> Score:
     """The best of steps that are doubled until they do twice as much: limits do nothing, then a lot."""
     quantities = candidate.attached.effect.quantities
-    scale = np.array([q.scale for q in quantities])
-    low, high = (np.array([getattr(q, side) for q in quantities]) for side in ("low", "high"))
+    amplitude = np.array([q.amplitude for q in quantities])
+    low, high, scale = (np.array([getattr(q, what) for q in quantities]) for what in ("low", "high", "scale"))
+    low, high, scale = low[amplitude], high[amplitude], scale[amplitude]
     found: list[Score] = []
     steps, before = scale, 0.0
     while np.all(steps <= high):
-        change = _change(space, candidate, np.diag(steps))
+        change = _change(space, candidate, _alone(candidate, steps))
         columns = change / steps
-        numbers, gain = solve(*space.reduced_tangent(columns), low, high, 20.0 * scale)
-        found.append(Score(candidate, numbers, gain, columns @ numbers))
+        amounts, gain = solve(*space.reduced_tangent(columns), low, high, 20.0 * scale)
+        numbers = np.array([q.start for q in quantities])
+        numbers[amplitude] = amounts
+        found.append(Score(candidate, numbers, gain, columns @ amounts))
         done = float(np.linalg.norm(change))
         if FELT < done < IN_PROPORTION * before:
             break
@@ -55,20 +58,28 @@ def _score_rolled_out(space: Space, candidate: Candidate) -> Score:
 
 
 def differences(space: Space, candidate: Candidate) -> Floats:
-    """(D, q) change of the weighted residual per unit of each quantity, from a step of its scale.
+    """(D, a) change of the weighted residual per unit of each amplitude, from a step of its scale.
 
     The step is longer where that is not felt: a limit or a dead band does nothing until it is reached.
     """
-    quantities = candidate.attached.effect.quantities
+    quantities = [q for q in candidate.attached.effect.quantities if q.amplitude]
     steps = np.array([q.scale for q in quantities])
-    change = _change(space, candidate, np.diag(steps))
+    change = _change(space, candidate, _alone(candidate, steps))
     for _ in range(LONGER):
         unfelt = (np.linalg.norm(change, axis=0) < FELT) & (steps * STRETCH < [q.high for q in quantities])
         if not unfelt.any():
             break
         steps = np.where(unfelt, STRETCH * steps, steps)
-        change[:, unfelt] = _change(space, candidate, np.diag(steps)[unfelt])
+        change[:, unfelt] = _change(space, candidate, _alone(candidate, steps)[unfelt])
     return np.asarray(change / steps)
+
+
+def _alone(candidate: Candidate, steps: Floats) -> Floats:
+    """(a, q) settings: each of the amplitudes alone at its step, shapes as they begin."""
+    quantities = candidate.attached.effect.quantities
+    settings = np.tile([q.start for q in quantities], (len(steps), 1))
+    settings[:, [q.amplitude for q in quantities]] = np.diag(steps)
+    return settings
 
 
 def _change(space: Space, candidate: Candidate, numbers: Floats) -> Floats:

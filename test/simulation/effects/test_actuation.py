@@ -40,13 +40,15 @@ def test_a_lag_answers_a_step_with_an_exponential() -> None:
 
 
 def test_a_saturation_holds_the_speed_and_keeps_the_direction() -> None:
-    limited = followed("velocity_saturation", ramp(), 2.0)  # 0.5 m/s
+    limited = followed("velocity_saturation", ramp(), 2.0, 8.0)  # 0.5 m/s
     speed, asked = np.linalg.norm(limited, axis=1), np.linalg.norm(ramp(), axis=1)
     assert speed.max() < 0.5
     assert speed[-1] > 0.499
     np.testing.assert_allclose(speed[asked < 0.2], asked[asked < 0.2], rtol=1e-3)
     assert (speed >= 0.917 * np.minimum(asked, 0.5) - 1e-12).all()
     np.testing.assert_allclose(limited[1:, 1], 2 * limited[1:, 0])
+    sharp = np.linalg.norm(followed("velocity_saturation", ramp(), 2.0, 60.0), axis=1)
+    np.testing.assert_allclose(sharp, np.minimum(asked, 0.5), rtol=0.012)
 
 
 def test_a_dead_band_takes_a_fixed_speed() -> None:
@@ -67,7 +69,8 @@ def test_a_jitter_scales_the_speed() -> None:
 def simulated(name: str, number: float, duration: float = 1.5) -> Floats:
     """(T + 1, 4) what the described shot does with the effect."""
     changed = Simulator(cell(), [Attached(effect(name), ())], threads=1)
-    motion = changed.motion(np.append(cell().defaults, number)[None], DESCRIBED[None], duration)
+    shapes = [q.start for q in effect(name).quantities[1:]]
+    motion = changed.motion(np.concatenate([cell().defaults, [number], shapes])[None], DESCRIBED[None], duration)
     return np.asarray(motion.positions[0])
 
 
