@@ -125,12 +125,16 @@ def refine(likelihood: Likelihood, values: Floats, watch: Watch = lambda *_: Tru
     return polish(calmed(likelihood, fit.linear), fit.point, watch)
 
 
-def growing(likelihood: Likelihood, values: Floats) -> Iterator[tuple[Likelihood, Fit]]:
-    """The beginning of each episode and the fit of the strongest parameters to it, longer from one to the next."""
+def growing(likelihood: Likelihood, values: Floats, held: Ints = NONE) -> Iterator[tuple[Likelihood, Fit]]:
+    """The beginning of each episode and the fit of the strongest parameters to it, longer from one to the next.
+
+    Those `held` stay as they are: a beginning of half a second says nothing of a frequency.
+    """
     point = start(likelihood, values)
     few = some(likelihood)
     first, share_asked = sensitivity(few, start(few, values)), len(few.inputs) / len(likelihood.inputs)
-    strong, steps = first.felt(STRONG * np.sqrt(share_asked), STRONG_SHARE), first.steps.copy()
+    strong = np.setdiff1d(first.felt(STRONG * np.sqrt(share_asked), STRONG_SHARE), held)
+    steps = first.steps.copy()
     for share in HORIZONS:
         part = likelihood.until(share * float(likelihood.time_s.max()))
         robust = max(ROBUST, 3.0 * typical_residual(part, point))

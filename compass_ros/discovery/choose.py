@@ -19,7 +19,7 @@ from compass_ros.discovery.joint import Joint, converge, from_second_start, wide
 from compass_ros.discovery.remainder import smooth_excess
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import screen
-from compass_ros.discovery.trials import TRIED, different, further, sketched, worth
+from compass_ros.discovery.trials import TRIED, at_other_rates, different, further, sketched, worth
 from compass_ros.discovery.unseen import HeldOut
 
 ENOUGH = 0.93
@@ -38,6 +38,9 @@ EQUAL_SHARE = 0.015
 """The same as a share of the excess: functional forms are never exactly right."""
 PREDICTS = 0.92
 """Share of the held-out excess that what is named must remove, but for a SMALL remainder: less is another law's."""
+CLEAR = 0.95
+"""Share from which an effect whose rivals all leave MANY_TIMES as much is named though it predicts less than that: what
+its form gets wrong grows in episodes that were not fitted."""
 LITTLE, MANY_TIMES, SEVERAL = 0.12, 4.0, 2
 """Share that an effect may leave where at least so many others, fitted as well, leave so many times as much."""
 NEEDED, SEEN = 0.05, 0.04
@@ -109,7 +112,8 @@ class Choice:
         """Whether a model explains the fitted episodes and predicts the others."""
         share = unseen.share(joint)
         predicts = share >= PREDICTS or (share >= FORM_SHARE and unseen.remainder(joint) < SMALL)
-        return self.enough(joint) and unseen.helps(joint) and predicts
+        clear = self.share(joint) > CLEAR and self._alone(joint)
+        return self.enough(joint) and unseen.helps(joint) and (predicts or clear)
 
     def enough(self, joint: Joint) -> bool:
         """Whether a model explains what there is to explain."""
@@ -164,6 +168,10 @@ def choose(
             choice = choice.of([from_second_start(best), *others])
         if choice.good(unseen):
             return _concluded(choice, candidates, unseen)
+    if other := at_other_rates(space, scores)[:1]:
+        choice = choice.of(sorted([*(converge(j, slight) for j in other), *choice.singles], key=worth))
+        if choice.good(unseen):
+            return _concluded(choice, candidates, unseen)
     if not choice.singles:
         return choice
     best, *others = different(choice.singles)
@@ -204,16 +212,19 @@ def _compared(choice: Choice, slight: float) -> list[Joint]:
 
 
 def _equals(best: Joint, choice: Choice, unseen: HeldOut) -> tuple[Joint, ...]:
-    """Other effects that explain the recordings as well: within EQUAL of log evidence, or EQUAL_SHARE."""
+    """Other effects that explain the recordings as well: within EQUAL of log evidence, or EQUAL_SHARE.
+
+    One that comes to a simpler one among them at an end of its shapes says nothing new.
+    """
     top = evidence(best, unseen)
     margin = max(EQUAL, EQUAL_SHARE * choice.excess / best.likelihood.correlation_time)
-    return tuple(
+    equal = [
         joint
         for joint in different(choice.singles)
-        if best.name not in (joint.name, joint.added[0].effect.limit)
-        and top - evidence(joint, unseen) < margin
-        and unseen.helps(joint)
-    )
+        if joint.name != best.name and top - evidence(joint, unseen) < margin and unseen.helps(joint)
+    ]
+    names = {best.name, *(joint.name for joint in equal)}
+    return tuple(joint for joint in equal if joint.added[0].effect.limit not in names)
 
 
 def simplest(good: Sequence[Joint]) -> Joint:

@@ -118,6 +118,14 @@ def from_second_start(joint: Joint) -> Joint:
     return second
 
 
+def from_first_guess(space: Space, attached: Attached, numbers: Floats) -> Joint:
+    """A fit that begins at the cell's first guess with the (q,) numbers of an effect."""
+    simulator, likelihood = widened(space.simulator, space.likelihood, (attached,))
+    values = likelihood.prior_mean.copy()
+    values[-len(numbers) :] = numbers
+    return Joint(simulator, likelihood, _grown(simulator, likelihood, values, space.fit.robust), (attached,))
+
+
 def grown(joint: Joint, attached: Attached, simulator: Simulator, likelihood: Likelihood, robust: float) -> Joint:
     """A fit of one effect to the beginning of episodes, grown to the whole of them, perhaps on other objects.
 
@@ -131,11 +139,17 @@ def _refined(
     simulator: Simulator, likelihood: Likelihood, added: tuple[Attached, ...], values: Floats, robust: float
 ) -> Joint:
     """A fit on a growing horizon to its optimum in the given weights, all that is felt free in the end."""
-    *_, (_, begun) = growing(likelihood, values)
-    of_effects = np.arange(len(simulator.cell.parameters), len(values))
-    _, fit = freed(likelihood, begun.point, 5, robust, of_effects)
+    fit = _grown(simulator, likelihood, values, robust)
     fit = settled(likelihood, replace(fit, robust=robust))
     return Joint(simulator, likelihood, fit, added, converged=True, settled=True)
+
+
+def _grown(simulator: Simulator, likelihood: Likelihood, values: Floats, robust: float) -> Fit:
+    """A fit on a growing horizon, shapes as they are until it is whole, and then all that is felt free."""
+    of_effects = np.arange(len(simulator.cell.parameters), len(values))
+    shapes = [not q.amplitude for attached in simulator.effects for q in attached.effect.quantities]
+    *_, (_, begun) = growing(likelihood, values, of_effects[shapes])
+    return freed(likelihood, begun.point, 5, robust, of_effects)[1]
 
 
 def _scaled(score: Score, share: float) -> Floats:

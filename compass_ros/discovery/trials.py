@@ -5,14 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from compass_ros.calibration.least_squares import minimise
-from compass_ros.discovery.joint import Joint, fit_jointly
+from compass_ros.discovery.joint import Joint, fit_jointly, from_first_guess
 from compass_ros.discovery.screen import Score, Space
+from compass_ros.types import Bools
 
 SKETCHED = 2
 """Steps of a sketch."""
 TRIED = 5
 """Sketches that are fitted at once, the best first; as many again where none of them is enough."""
+RATIOS = (0.7, 1.0, 1.4, 2.0)
+"""Frequencies that are tried, as parts of the one that first order finds..."""
+RIVALS = 0.5
+"""...if the effect gains this share of the best, to first order."""
 PROMISING = 0.02
 """Least first-order gain, as a share of the best, to be sketched: of contacts it says little."""
 
@@ -30,6 +37,25 @@ def further(joint: Joint, slight: float, iterations: int) -> Joint:
     fit, tolerance = joint.fit, max(1.0, slight)
     fit = minimise(joint.likelihood, fit.point, fit.free, iterations, fit.robust, tolerance, fit.linear, fresh=False)
     return replace(joint, fit=fit)
+
+
+def at_other_rates(space: Space, scores: Sequence[Score]) -> list[Joint]:
+    """Fits of the most promising candidate that has a frequency, from the first guess, at several; the best first.
+
+    A wrong frequency looks right where the plain fit has bent its parameters to stand for the right one.
+    """
+    best = next((s for s in scores if _rates(s).any()), None)
+    if best is None or best.gain < RIVALS * scores[0].gain:
+        return []
+    quantities = best.candidate.attached.effect.quantities
+    low, high = ([getattr(q, side) for q in quantities] for side in ("low", "high"))
+    tried = [np.clip(np.where(_rates(best), ratio, 1.0) * best.numbers, low, high) for ratio in RATIOS]
+    return sorted((from_first_guess(space, best.candidate.attached, numbers) for numbers in tried), key=worth)
+
+
+def _rates(score: Score) -> Bools:
+    """(q,) which quantities are frequencies."""
+    return np.array([q.unit == "Hz" for q in score.candidate.attached.effect.quantities])
 
 
 def worth(joint: Joint) -> float:

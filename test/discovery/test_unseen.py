@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import refine
 from compass_ros.cells import load
 from compass_ros.discovery.choose import Choice
+from compass_ros.discovery.joint import Joint
 from compass_ros.discovery.unseen import HELD_OUT_SEEN, held_out, unexpected
 from compass_ros.pipeline import pose
 from compass_ros.simulation import Simulator
@@ -20,6 +22,7 @@ from compass_ros.simulation.replay import Recordings
 from test.discovery.planted import HELD_OUT, PUCKS, joint, recorded, space_of
 from test.simulation.table import simulator
 
+RIVALS = (Attached(EFFECTS["magnus"], PUCKS), Attached(EFFECTS["quadratic_drag"], PUCKS))
 PENDULUM = load(Path(__file__).parents[2] / "examples" / "own_cell" / "pendulum.yaml")
 DRAG = Attached(EFFECTS["viscous_drag"], PUCKS)
 
@@ -35,7 +38,7 @@ def test_what_predicts_only_a_part_helps_and_is_not_named() -> None:
     """Half of the true drag leaves a quarter of the surprise."""
     space = space_of(recorded(DRAG, [0.3]))
     unseen = held_out(recorded(DRAG, [0.3], HELD_OUT, 1), space.likelihood, space.fit)
-    whole, half = joint(space, DRAG, [0.3]), joint(space, DRAG, [0.15])
+    whole, half = joint(space, DRAG, [0.3]), costing(joint(space, DRAG, [0.15]), 30.0)
     choice = Choice((whole, half), None, excess=1000.0, floor=0.0)  # both explain the fitted episodes
     assert unseen.share(whole) == pytest.approx(1.0, abs=0.02)
     assert unseen.share(half) == pytest.approx(0.75, abs=0.1)
@@ -43,6 +46,13 @@ def test_what_predicts_only_a_part_helps_and_is_not_named() -> None:
     assert unseen.helps(half)
     assert choice.nameable(whole, unseen)
     assert not choice.nameable(half, unseen)
+    weak, strong = (tuple(costing(joint(space, rival, [0.01]), left) for rival in RIVALS) for left in (900.0, 100.0))
+    assert replace(choice, singles=(half, *weak)).nameable(half, unseen), "no other one explains much"
+    assert not replace(choice, singles=(half, *strong)).nameable(half, unseen), "others leave 100, it leaves 30"
+
+
+def costing(fitted: Joint, cost: float) -> Joint:
+    return replace(fitted, fit=replace(fitted.fit, point=replace(fitted.fit.point, cost=cost)))
 
 
 def swings(numbers: tuple[float, ...], seed: int) -> Likelihood:
