@@ -1,0 +1,30 @@
+"""A frequency that first order gets wrong is found among others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compass_ros.discovery.candidates import Candidate
+from compass_ros.discovery.screen import Score
+from compass_ros.discovery.trials import at_other_rates
+from compass_ros.simulation.effects import EFFECTS, Attached
+from test.discovery.planted import PUCKS, recorded, space_of
+
+PULSATION = Attached(EFFECTS["pulsating_lift"], PUCKS)
+TILT = Attached(EFFECTS["table_tilt"], PUCKS)
+
+
+def test_half_of_the_true_frequency_leads_to_the_true_one() -> None:
+    space = space_of(recorded(PULSATION, [0.0, 0.02, 0.7]))
+    nothing = np.zeros_like(space.residual)
+    wrong = Score(Candidate(PULSATION), np.array([0.003, 0.003, 0.35]), 100.0, nothing)
+    best, *others = at_other_rates(space, [wrong])
+    assert best.fit.point.values[-1] == pytest.approx(0.7, abs=0.02)
+    assert np.hypot(*best.fit.point.values[-3:-1]) == pytest.approx(0.02, rel=0.1)
+    assert len(others) == 3
+    tilt = Score(Candidate(TILT), np.zeros(2), 300.0, nothing)
+    assert at_other_rates(space, [tilt, wrong]) == []
+    assert at_other_rates(space, [replace(tilt, gain=1.0)]) == []
