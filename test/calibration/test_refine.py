@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 
 from compass_ros.calibration.least_squares import Point, minimise, start
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import Refined, chi_square, refine, standard_errors
+from compass_ros.calibration.refine import Refined, chi_square, growing, refine, standard_errors
 from compass_ros.types import Floats
 from test.calibration.toys import likelihood, oscillation
 from test.simulation.table import actions, cell, simulator
@@ -40,6 +40,14 @@ def test_a_whole_trajectory_misleads_where_a_growing_horizon_does_not() -> None:
     assert abs(lost.values[0] - 0.8) > 0.1
     found = refine(given, np.zeros(1))
     assert found.fit.point.values[0] == pytest.approx(0.8, abs=3e-3)
+
+
+def test_what_is_held_stays_while_the_horizon_grows() -> None:
+    first = np.array([0.3])
+    *_, (_, free) = growing(ringing(0.8), first)
+    *_, (_, held) = growing(ringing(0.8), first, np.array([0]))
+    assert free.point.values[0] != first[0]
+    assert held.point.values[0] == first[0]
 
 
 def test_a_smooth_simulator_is_not_called_rough() -> None:
