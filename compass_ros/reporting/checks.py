@@ -162,6 +162,6 @@ def _verdict(result: Result) -> Iterator[Check]:
 def _blind_spots(result: Result) -> Iterator[Check]:
     names = result.mismatch.undetectable
     if names:
-        text = "These shots could not have shown " + ", ".join(names[:NAMES_SHOWN])
+        text = "These episodes could not have shown " + ", ".join(names[:NAMES_SHOWN])
         text += f" and {len(names) - NAMES_SHOWN} more." if len(names) > NAMES_SHOWN else "."
         yield Check("note", f"Blind to {len(names)} effect{'s' if len(names) > 1 else ''}", text)

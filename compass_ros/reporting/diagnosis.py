@@ -53,7 +53,7 @@ def print_diagnosis(result: Result, extras: ReportExtras, console: Console | Non
         out.print(Text.assemble((f"{MARK[check.level]} {check.title}. ", STYLE[check.level]), check.detail))
     out.print(Text(f"Is the result good? {SUMMARY[overall(checks)]}", STYLE[overall(checks)]))
     if result.mismatch.undetectable:
-        out.print(Text("These shots could not have shown: " + ", ".join(result.mismatch.undetectable), "dim"))
+        out.print(Text("These episodes could not have shown: " + ", ".join(result.mismatch.undetectable), "dim"))
     if result.mismatch.next_experiment:
         out.print(Text.assemble(("Next experiment: ", "bold"), result.mismatch.next_experiment))
 
@@ -93,7 +93,7 @@ def _curves(result: Result) -> Iterator[Text]:
     low = min(max(floor, largest * 1e-3), largest * 0.5)
     end = max(float(c.time_s[-1]) for c in curves)
     yield Text(
-        f"Error over the {end:.1f} s of a shot, {BARS[0]} {with_unit(low, result.unit)} and less, "
+        f"Error over the {end:.1f} s of an episode, {BARS[0]} {with_unit(low, result.unit)} and less, "
         f"{BARS[-1]} {with_unit(largest, result.unit)}, logarithmic:"
     )
     width = max(len(c.object) for c in curves)
