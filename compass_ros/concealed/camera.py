@@ -144,7 +144,7 @@ LAG = Law(
     _PHASES,
     draw=nothing,
     camera=_average,
-    library=lambda size, shape: {"time": 0.005 * size},
+    library=lambda size, shape: {"time": 0.005 * size, "spread": 3**-0.5},
     most=20.0,
 )
 

@@ -72,7 +72,7 @@ SATURATION = Law(
     ("strike", "all"),
     draw=_edge,
     command=_saturation,
-    library=lambda size, shape: {"inverse_limit": size},
+    library=lambda size, shape: {"inverse_limit": size, "sharpness": shape["power"]},
     first=2.0,
     most=10.0,
 )

@@ -20,8 +20,6 @@ LOOSE = {
     "rate_dependent_restitution": 0.35,  # decided at the first touch here, at every moment there
     "tangential_impulse": 0.10,  # a true Coulomb limit here, faded at 10 mm/s there
     "off_centre_mass": 0.10,
-    "velocity_saturation": 0.05,
-    "tracking_lag": 0.10,  # a box of the same mean delay here, an exponential there
     "pulsating_lift": 0.05,
     "stroke_jitter": 0.05,
 }

@@ -23,7 +23,7 @@ EFFECT = Effect(
     channel="actuation",
     quantities=(
         Quantity("inverse_limit", "s/m", 0.0, 10.0, 0.3),
-        Quantity("sharpness", "1", 2.0, 60.0, 4.0, amplitude=False, start=12.0),
+        Quantity("sharpness", "1", 2.0, 60.0, 4.0, amplitude=False, start=8.0),
     ),
     sentence="a limit of the arm's speed",
     controls=_controls,
