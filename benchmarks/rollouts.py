@@ -45,7 +45,7 @@ def compare(rollouts: int, threads: int, rounds: int, duration: float = 2.5) -> 
     low, high = np.array([(a.low, a.high) for a in cell.action]).T
     shots = np.random.default_rng(0).uniform(low, high, (rollouts, len(low)))
     values = np.tile(cell.defaults, (rollouts, 1))
-    with_field = np.hstack([values, np.tile([0.3, 0.2, 0.0, 0.12], (rollouts, 1))])
+    with_field = np.hstack([values, np.tile([0.3, 0.2, 0.0, 0.12, 0.5], (rollouts, 1))])
     runs: tuple[Callable[[], object], ...] = (
         bare_run(plain, rollouts, values, shots, duration),
         lambda: plain.motion(values, shots, duration),

@@ -16,7 +16,7 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.methods import compass_config, method
 from compass_ros.calibration.noise import Noise, measure_noise
 from compass_ros.calibration.problem import Allowance, Problem
-from compass_ros.calibration.refine import Refined, fitted_launches, refine
+from compass_ros.calibration.refine import Refined, refine, with_launches
 from compass_ros.cells import Cell
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery, discover, not_evaluated
@@ -216,7 +216,7 @@ def launched(simulator: Simulator, data: Recordings, noise: Noise, values: Float
     How an arm repeats itself, or a first state that was measured with noise, differs from shot to shot: it says
     nothing about a simulator. Where the cell calls its launches exact they stay as commanded.
     """
-    return Replay(simulator, data, fitted_launches(pose(simulator, data, noise).likelihood, values))
+    return Replay(simulator, data, with_launches(pose(simulator, data, noise).likelihood, values).launch)
 
 
 def noise_floor(cell: Cell, noise: Noise) -> float:

@@ -21,7 +21,7 @@ from compass_ros.simulation.export import write_effects_of, write_scene
 cell = load("air_hockey")
 fan = Attached(effect("fan_field"), ("puck1", "puck2"))
 simulator = Simulator(cell, [fan], threads=1)
-values = np.append(cell.values({"puck2@dyna@friction_sliding": 0.03}), [0.3, 0.2, -0.05, 0.1])
+values = np.append(cell.values({"puck2@dyna@friction_sliding": 0.03}), [0.3, 0.2, -0.05, 0.1, 0.5])
 shot = np.array([-0.225, 0.075, 0.0, 0.45])  # start x, y [m], angle [rad], speed [m/s]
 folder = Path(tempfile.mkdtemp())
 write_scene(cell, values[:64], folder / "scene.xml")

@@ -323,13 +323,13 @@ def with_roughness(likelihood: Likelihood, fit: Fit, draws: int = 6) -> Likeliho
     return replace(likelihood, sigma=np.hypot(likelihood.sigma, grown))
 
 
-def fitted_launches(likelihood: Likelihood, values: Floats) -> Floats:
-    """(E, A) offsets of each episode's inputs that agree best with it, for (P,) values that stay as they are."""
+def with_launches(likelihood: Likelihood, values: Floats) -> Point:
+    """(P,) values that stay as they are, each episode with the launch that agrees best with it."""
     point = start(likelihood, values)
     if not likelihood.launch_std.any():
-        return point.launch
+        return point
     robust = max(ROBUST, 3.0 * typical_residual(likelihood, point))
-    return minimise(likelihood, point, NONE, 12, robust, tolerance=1.0, fresh=False).point.launch
+    return minimise(likelihood, point, NONE, 12, robust, tolerance=1.0, fresh=False).point
 
 
 def standard_errors(refined: Refined) -> tuple[Ints, Floats]:

@@ -8,7 +8,7 @@ that the library's documentation gives.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -31,6 +31,8 @@ class Form:
     names: tuple[str, ...]
     start: Callable[[Ingredient], list[float]]
     formula: Formula
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Ranges of quantities that the formula needs."""
 
 
 def _mass(at: Moment) -> Floats:
@@ -48,7 +50,7 @@ def _across(v: Floats) -> Floats:
 
 def _peaked(q: Floats, at: Moment) -> Floats:
     arm, r = _arm(q, at)
-    return np.asarray(_mass(at) * q[0] * arm / q[3] * np.exp(0.5 * (1 - (r / q[3]) ** 2)))
+    return np.asarray(_mass(at) * q[0] * arm / q[3] * (1 + q[4] * ((r / q[3]) ** 2 - 1) / 2) ** (-1 / q[4]))
 
 
 def _attraction(q: Floats, at: Moment) -> Floats:
@@ -84,6 +86,8 @@ def _centre(i: Ingredient, radius: str, factor: float = 1.0) -> list[float]:
 
 
 _FIELD = ("strength", "centre_x", "centre_y")
+_PEAKED = (*_FIELD, "radius", "tail")
+_TAIL = {"tail": (1e-4, 1.2)}
 FORMS: Mapping[str, Form] = {
     "table_tilt": Form(
         ("tilt_x", "tilt_y"),
@@ -95,8 +99,8 @@ FORMS: Mapping[str, Form] = {
         lambda i: [0.01 * i.size * i.shape["x"], 0.01 * i.size * i.shape["y"], i.shape["air_speed"]],
         _crosswind,
     ),
-    "fan_field": Form((*_FIELD, "radius"), lambda i: _centre(i, "radius"), _peaked),
-    "swirl": Form((*_FIELD, "radius"), lambda i: _centre(i, "radius"), lambda q, at: _across(_peaked(q, at))),
+    "fan_field": Form(_PEAKED, lambda i: [*_centre(i, "radius"), 0.5], _peaked, _TAIL),
+    "swirl": Form(_PEAKED, lambda i: [*_centre(i, "radius"), 0.5], lambda q, at: _across(_peaked(q, at)), _TAIL),
     "point_attraction": Form((*_FIELD, "core"), lambda i: _centre(i, "depth"), _attraction),
     "viscous_drag": Form(("rate",), lambda i: [0.02 * i.size], lambda q, at: -_mass(at) * q[0] * at.velocity),
     "quadratic_drag": Form(
@@ -174,7 +178,9 @@ def _fitted(ingredient: Ingredient, form: Form, table: Table, played: Played) ->
         return np.asarray(np.concatenate(parts) / unit)
 
     scale = np.concatenate([np.maximum(np.abs(start), 0.02 * np.abs(start).max()), [1.0, 1.0]])
-    found = least_squares(residual, np.concatenate([start, [0.0, 0.0]]), x_scale=scale, max_nfev=60)
+    free = (-np.inf, np.inf)
+    low, high = np.array([*(form.bounds.get(name, free) for name in form.names), free, free]).T
+    found = least_squares(residual, np.concatenate([start, [0.0, 0.0]]), bounds=(low, high), x_scale=scale, max_nfev=60)
     return {name: float(value) for name, value in zip(form.names, found.x, strict=False)}
 
 

@@ -17,7 +17,8 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import Refined, growing, polish
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.joint import Joint, grown, widened
-from compass_ros.discovery.tangents import screen
+from compass_ros.discovery.screen import Score, Space
+from compass_ros.discovery.tangents import changes, screen
 from compass_ros.discovery.trials import TRIED, different, further, sketched
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Quantity
@@ -27,8 +28,8 @@ BEGUN = 1.1
 """Mean squared residual at which a simulator has begun to fail."""
 SLIGHT = 2.0
 """Log likelihood that a further step of these first fits must promise."""
-SIZES = (1.0, 4.0, 16.0)
-"""Of an effect that is tried, in its scale."""
+SIZES, AROUND = (0.5, 1.0, 4.0, 16.0), 12
+"""Of an effect that is tried, in its scale; directions of two amplitudes."""
 FEW = 2
 """Candidates that are followed to the end."""
 
@@ -55,8 +56,10 @@ def from_the_beginning(
     if beginning is None:
         return
     failed = beginning.failed
-    space, scores = screen(simulator, failed.likelihood, failed.fit, [c for c in asked if c.by_force])
-    begun = sorted((_begun(simulator, beginning, c) for c in asked if not c.by_force), key=_left)
+    space, scores = screen(simulator, failed.likelihood, failed.fit, asked)
+    others = sorted((s for s in scores if not s.candidate.by_force), key=lambda s: -max(s.gain, _gain(space, s)))
+    begun = sorted((_begun(simulator, beginning, s.candidate) for s in others[:TRIED]), key=_left)
+    scores = [s for s in scores if s.candidate.by_force]
     promising = [*sketched(space, scores)[:TRIED], *(_freed(j, beginning) for j in different(begun)[:FEW])]
     tried = sorted((further(j, SLIGHT, 4) for j in promising), key=_left)
     for joint in different(tried)[:FEW]:
@@ -82,6 +85,14 @@ def _where_it_fails(likelihood: Likelihood) -> Beginning | None:
     return None
 
 
+def _gain(space: Space, score: Score) -> float:
+    """What the best of some sizes explains that the parameters cannot [log likelihood]; first order may miss it."""
+    candidate = score.candidate
+    change = changes(space, candidate, np.array(_sizes(candidate.attached.effect.quantities)))
+    left = space.off_parameters(space.residual[:, None] + change)
+    return 0.5 * float(left[:, 0] @ left[:, 0] - np.min(np.sum(left**2, axis=0)))
+
+
 def _begun(simulator: Simulator, beginning: Beginning, candidate: Candidate) -> Joint:
     """A candidate of which first order says little (contacts, commands, sensors), fitted from where all was well."""
     added = (candidate.attached,)
@@ -103,16 +114,17 @@ def _begun(simulator: Simulator, beginning: Beginning, candidate: Candidate) -> 
 
 
 def _sizes(quantities: Sequence[Quantity]) -> list[Floats]:
-    """(q,) settings to begin with: none, and each amplitude alone, small and large. Some act beyond a limit only."""
-    none = np.array([q.start for q in quantities])
-    sizes = [
-        np.where(np.arange(len(quantities)) == i, sign * size * q.scale, none)
-        for i, q in enumerate(quantities)
-        for size in SIZES
-        for sign in (1.0, -1.0)
-        if q.amplitude and q.low <= sign * size * q.scale <= q.high
-    ]
-    return [none, *sizes]
+    """(q,) settings to begin with: none, and each amplitude alone, small and large, or two of one unit all around.
+
+    Some act beyond a limit only. What an offset does at an impact is of second order: its direction must be tried.
+    """
+    none, scale, low, high = np.array([(q.start, q.scale, q.low, q.high) for q in quantities]).T
+    axes = np.eye(len(quantities))[[q.amplitude for q in quantities]]
+    rays = [sign * axis for axis in axes for sign in (1.0, -1.0)]
+    if len(axes) == 2 and len({q.unit for q in quantities if q.amplitude}) == 1:
+        rays = [np.cos(angle) * axes[0] + np.sin(angle) * axes[1] for angle in np.arange(AROUND) * 2 * np.pi / AROUND]
+    sizes = [none + size * ray * scale for size in SIZES for ray in rays]
+    return [none, *(s for s in sizes if np.all((low <= s) & (s <= high)))]
 
 
 def _freed(joint: Joint, beginning: Beginning) -> Joint:

@@ -140,18 +140,20 @@ def choose(
     scores: Sequence[Score],
     candidates: Sequence[Candidate],
     unseen: HeldOut,
-    early: Iterable[list[Joint]] = (),
+    begun: Iterable[list[Joint]] = (),
+    first: bool = False,
 ) -> Choice:
     """Fit the promising candidates; where none is enough, others, and then the best of them with a second one.
 
-    `early`: models that the beginnings of the episodes suggest, some at a time; tried first.
+    `begun`: models that the beginnings of the episodes suggest, some at a time, each list fitted when it is asked for;
+    tried `first`, or where no other effect is enough.
     """
     base = float(cost(space.likelihood, [space.fit.point], space.fit.robust)[0][0])
     floor = floor_of(space.likelihood, space.fit, base)
     choice = Choice((), None, base - floor, floor)
     slight = SLIGHT * choice.excess
-    for grown in early:
-        choice = choice.of(sorted([*grown, *choice.singles], key=worth))
+    if first:
+        choice = _tried(choice, begun, unseen)
         if choice.good(unseen):
             return _concluded(choice, candidates, unseen)
     sketches = sketched(space, scores)
@@ -168,17 +170,37 @@ def choose(
             choice = choice.of([from_second_start(best), *others])
         if choice.good(unseen):
             return _concluded(choice, candidates, unseen)
-    if other := at_other_rates(space, scores)[:1]:
-        choice = choice.of(sorted([*(converge(j, slight) for j in other), *choice.singles], key=worth))
+    if other := at_other_rates(space, scores):
+        choice = _tried(choice, [[converge(other, slight)]], unseen)
+    if not first and not choice.good(unseen):
+        choice = _tried(choice, begun, unseen)
+    if choice.good(unseen):
+        return _concluded(choice, candidates, unseen)
+    return _in_pairs(choice, space, candidates, unseen) if choice.singles else choice
+
+
+def _tried(choice: Choice, more: Iterable[list[Joint]], unseen: HeldOut) -> Choice:
+    """The same with more models, until one is enough."""
+    for models in more:
+        choice = choice.of(sorted([*models, *choice.singles], key=worth))
         if choice.good(unseen):
-            return _concluded(choice, candidates, unseen)
-    if not choice.singles:
-        return choice
+            break
+    return choice
+
+
+def _in_pairs(choice: Choice, space: Space, candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
+    """No effect is enough: two at once, or one that two have led to the right place."""
+    slight = SLIGHT * choice.excess
     best, *others = different(choice.singles)
     firsts = [best] if choice.share(best) > LEADS else [best, *(converge(j, slight, 4) for j in others[:1])]
     pairs = _pairs(firsts, candidates, slight)
-    if pairs and not (choice.shown_by(pairs[0]).share(pairs[0]) > SURELY and unseen.helps(pairs[0])):
-        pairs += _pairs([_without_first(pairs[0], space)], candidates, slight)
+    if pairs:
+        alone = [further(_alone(pairs[0], i, space), slight, 5) for i in (0, 1)]
+        choice = choice.of(sorted([*alone, *choice.singles], key=worth))
+        if choice.good(unseen):
+            return _concluded(choice, candidates, unseen)
+        if not (choice.shown_by(pairs[0]).share(pairs[0]) > SURELY and unseen.helps(pairs[0])):
+            pairs += _pairs(alone[1:], candidates, slight)
     pair = max(pairs, key=lambda p: evidence(p, unseen), default=None)
     if pair and pair.fit.point.cost < min(j.fit.point.cost for j in choice.singles):
         choice = choice.shown_by(pair)
@@ -255,13 +277,18 @@ def evidence(joint: Joint, unseen: HeldOut) -> float:
     return -worth(joint) - unseen.surprise(joint) / joint.likelihood.correlation_time
 
 
-def _without_first(pair: Joint, space: Space) -> Joint:
-    """The second effect of a pair alone: the first was chosen when nothing stood beside it."""
-    gone, kept = pair.added
+def _alone(pair: Joint, i: int, space: Space) -> Joint:
+    """One effect of a pair without the other, fitted from where the pair stands.
+
+    The second, since the first was chosen when nothing stood beside it; and either, since the way there may have led
+    an effect to the right place that from the plain fit was led to a wrong one.
+    """
+    kept = pair.added[i]
     simulator, likelihood = widened(space.simulator, space.likelihood, (kept,))
-    known, size = len(space.fit.point.values), len(gone.effect.quantities)
+    known, size = len(space.fit.point.values), len(pair.added[0].effect.quantities)
     old = pair.fit.point
-    values = np.concatenate([old.values[:known], old.values[known + size :]])
+    own = old.values[known : known + size] if i == 0 else old.values[known + size :]
+    values = np.concatenate([old.values[:known], own])
     free = np.concatenate([pair.fit.free[pair.fit.free < known], np.arange(known, len(values))])
     fit = minimise(likelihood, Point(values, old.launch, np.inf), free, 4, pair.fit.robust, 2.0, fresh=False)
     return Joint(simulator, likelihood, fit, (kept,))

@@ -75,8 +75,7 @@ def discover(
         return found.failed(f"No verdict: {cause}. That is the simulator's numerics, not physics.")
     tell("fit effects", 0.4)
     unseen = held_out(judge, space.likelihood, space.fit)
-    early = from_the_beginning(simulator, *plain, asked) if poor(refined) else ()
-    choice = choose(space, scores, asked, unseen, early)
+    choice = choose(space, scores, asked, unseen, from_the_beginning(simulator, *plain, asked), poor(refined))
     again = _restarted(*plain, choice, simulator)
     if again is not None:  # the plain simulator does better than it was thought to: begin again from there
         space, scores = screen(simulator, again.likelihood, again.fit, asked)

@@ -10,7 +10,7 @@ import numpy as np
 
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
-from compass_ros.calibration.refine import Refined, covariance, fitted_launches
+from compass_ros.calibration.refine import Refined, covariance, with_launches
 from compass_ros.discovery.choose import Choice
 from compass_ros.discovery.formula import Proposal, propose
 from compass_ros.discovery.joint import Joint, from_second_start
@@ -179,7 +179,7 @@ class Finding:
     def _held_out(self, likelihood: Likelihood, values: Floats) -> float:
         """rms distance on held-out episodes [m], each with the launch that agrees best with it."""
         judged = likelihood.on(self.judge)
-        inputs = judged.inputs + fitted_launches(judged, values)
+        inputs = judged.inputs + with_launches(judged, values).launch
         missed = judged.predict(np.tile(values, (len(inputs), 1)), inputs, judged.time_s) - judged.measured
         objects = max(len(self.simulator.cell.objects), 1)
         return float(np.sqrt(np.nanmean(missed**2) * missed.shape[2] / objects))

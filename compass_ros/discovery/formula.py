@@ -18,9 +18,8 @@ from math import comb, log
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Point
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import fitted_launches, residual_at
+from compass_ros.calibration.refine import residual_at, with_launches
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.joint import Joint, fit_jointly
 from compass_ros.discovery.screen import Score, Space
@@ -225,6 +224,5 @@ def _proposal(formula: Formula, joint: Joint, gain: float) -> Proposal:
 
 def _excess(likelihood: Likelihood, values: Floats) -> float:
     """Mean squared residual above one, the noise floor; each episode has the launch that agrees best with it."""
-    point = Point(values, fitted_launches(likelihood, values), np.inf)
     measured = ~np.isnan(likelihood.measured)
-    return float(np.mean(residual_at(likelihood, point)[measured] ** 2)) - 1.0
+    return float(np.mean(residual_at(likelihood, with_launches(likelihood, values))[measured] ** 2)) - 1.0

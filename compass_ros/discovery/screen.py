@@ -22,6 +22,9 @@ from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Quantity
 from compass_ros.types import Floats
 
+STARTS = 3
+"""Places from which the shapes of a force are searched."""
+
 
 @dataclass(frozen=True)
 class Score:
@@ -84,7 +87,7 @@ class Space:
         cell = self.fit.point.values[: len(self.simulator.cell.parameters)]
         for i, amplitudes in enumerate(direction):
             numbers = np.tile(shapes + amplitudes, (episodes, 1))
-            size = float(np.max(np.abs(amplitudes)))
+            size = float(np.max(np.abs(amplitudes))) or 1.0
             forces = self.simulator.forces(candidate.attached, numbers, cell, states)
             for name, n in zip(objects, chosen, strict=True):
                 out[:, :, n, :, i] = forces[name] / self.pushes.mass[n] / size
@@ -132,34 +135,9 @@ def solve(matrix: Floats, pull: Floats, low: Floats, high: Floats, prior: Floats
 
 
 def score_force(space: Space, candidate: Candidate) -> Score:
-    """Best shape and amplitudes of a force: a grid over the shapes, then a simplex from the best three points."""
+    """Best shape and amplitudes of a force: a grid over the shapes, then a simplex from its best points."""
     quantities = candidate.attached.effect.quantities
-    shape_of = [i for i, q in enumerate(quantities) if not q.amplitude]
-    best: list[tuple[float, Floats]] = []
-    for point in product(*(shape_grid(quantities[i]) for i in shape_of)):
-        shapes = np.zeros(len(quantities))
-        shapes[shape_of] = point
-        _, gain = _at(space, candidate, shapes)
-        best.append((gain, shapes))
-    best.sort(key=lambda item: -item[0])
-    if shape_of:
-        low, high = (np.array([getattr(quantities[i], side) for i in shape_of]) for side in ("low", "high"))
-
-        def fall(point: Floats) -> float:
-            shapes = np.zeros(len(quantities))
-            shapes[shape_of] = point
-            return -_at(space, candidate, shapes)[1]
-
-        for _, shapes in list(best[:3]):
-            found = minimize(
-                fall, shapes[shape_of], method="Nelder-Mead", bounds=list(zip(low, high, strict=True)),
-                options={"maxfev": 60 * len(shape_of), "xatol": 1e-4, "fatol": 1e-2},
-            )  # fmt: skip
-            polished = np.zeros(len(quantities))
-            polished[shape_of] = found.x
-            best.append((-float(found.fun), polished))
-        best.sort(key=lambda item: -item[0])
-    gain, shapes = best[0]
+    shapes = _best_shapes(space, candidate)
     numbers, gain = _at(space, candidate, shapes)
     directions = np.diag([q.scale for q in quantities])[[i for i, q in enumerate(quantities) if q.amplitude]]
     if not candidate.attached.effect.superposes:
@@ -169,6 +147,39 @@ def score_force(space: Space, candidate: Candidate) -> Score:
     if not candidate.attached.effect.superposes:
         sizes = np.array([np.max(np.abs(numbers - shapes))])
     return Score(candidate, numbers, gain, columns @ sizes)
+
+
+def _best_shapes(space: Space, candidate: Candidate) -> Floats:
+    """(q,) the shapes that gain most, zeros for amplitudes.
+
+    The simplex starts from STARTS points of which no two are neighbours in the grid: they lead to different places.
+    """
+    quantities = candidate.attached.effect.quantities
+    shape_of = [i for i, q in enumerate(quantities) if not q.amplitude]
+    if not shape_of:
+        return np.zeros(len(quantities))
+
+    def at(point: Floats) -> Floats:
+        shapes = np.zeros(len(quantities))
+        shapes[shape_of] = point
+        return shapes
+
+    def fall(point: Floats) -> float:
+        return -_at(space, candidate, at(point))[1]
+
+    grids = [shape_grid(quantities[i]) for i in shape_of]
+    nodes = np.array(list(product(*(range(len(grid)) for grid in grids))))
+    points = np.array(list(product(*grids)))
+    falls = np.array([fall(point) for point in points])
+    starts: list[int] = []
+    for i in np.argsort(falls, kind="stable"):
+        if len(starts) < STARTS and all(np.abs(nodes[i] - nodes[k]).max() > 1 for k in starts):
+            starts.append(int(i))
+    bounds = [(quantities[i].low, quantities[i].high) for i in shape_of]
+    options = {"maxfev": 60 * len(shape_of), "xatol": 1e-4, "fatol": 1e-2}
+    found = [minimize(fall, points[i], method="Nelder-Mead", bounds=bounds, options=options) for i in starts]
+    best = min(found, key=lambda one: float(one.fun))
+    return at(best.x if best.fun < falls[starts[0]] else points[starts[0]])
 
 
 def _at(space: Space, candidate: Candidate, shapes: Floats) -> tuple[Floats, float]:
@@ -197,8 +208,10 @@ def _at(space: Space, candidate: Candidate, shapes: Floats) -> tuple[Floats, flo
 
 
 def shape_grid(shape: Quantity) -> Floats:
-    """Where the search for a shape begins: places evenly, sizes and rates in equal ratios."""
+    """Where the search for a shape begins: places evenly, sizes and rates in equal ratios, a tail at one."""
     low, high = shape.low, shape.high
+    if shape.name == "tail":
+        return np.array([shape.start])
     if low < 0 < high:
         return np.linspace(0.85 * low, 0.85 * high, 9 if high - low > 0.6 else 5)
     return np.geomspace(max(low, 0.02 * high), 0.8 * high, 12 if shape.name == "frequency" else 4)

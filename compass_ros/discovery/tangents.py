@@ -44,7 +44,7 @@ def _score_rolled_out(space: Space, candidate: Candidate) -> Score:
     found: list[Score] = []
     steps, before = scale, 0.0
     while np.all(steps <= high):
-        change = _change(space, candidate, _alone(candidate, steps))
+        change = changes(space, candidate, _alone(candidate, steps))
         columns = change / steps
         amounts, gain = solve(*space.reduced_tangent(columns), low, high, 20.0 * scale)
         numbers = np.array([q.start for q in quantities])
@@ -64,13 +64,13 @@ def differences(space: Space, candidate: Candidate) -> Floats:
     """
     quantities = [q for q in candidate.attached.effect.quantities if q.amplitude]
     steps = np.array([q.scale for q in quantities])
-    change = _change(space, candidate, _alone(candidate, steps))
+    change = changes(space, candidate, _alone(candidate, steps))
     for _ in range(LONGER):
         unfelt = (np.linalg.norm(change, axis=0) < FELT) & (steps * STRETCH < [q.high for q in quantities])
         if not unfelt.any():
             break
         steps = np.where(unfelt, STRETCH * steps, steps)
-        change[:, unfelt] = _change(space, candidate, _alone(candidate, steps)[unfelt])
+        change[:, unfelt] = changes(space, candidate, _alone(candidate, steps)[unfelt])
     return np.asarray(change / steps)
 
 
@@ -82,7 +82,7 @@ def _alone(candidate: Candidate, steps: Floats) -> Floats:
     return settings
 
 
-def _change(space: Space, candidate: Candidate, numbers: Floats) -> Floats:
+def changes(space: Space, candidate: Candidate, numbers: Floats) -> Floats:
     """(D, n) change of the weighted residual by each of (n, q) settings of an effect."""
     point, likelihood = space.fit.point, space.likelihood
     with_it = space.simulator.with_effects([*space.simulator.effects, candidate.attached])

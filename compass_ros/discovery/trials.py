@@ -39,18 +39,18 @@ def further(joint: Joint, slight: float, iterations: int) -> Joint:
     return replace(joint, fit=fit)
 
 
-def at_other_rates(space: Space, scores: Sequence[Score]) -> list[Joint]:
-    """Fits of the most promising candidate that has a frequency, from the first guess, at several; the best first.
+def at_other_rates(space: Space, scores: Sequence[Score]) -> Joint | None:
+    """The best of fits of the most promising candidate that has a frequency, at several, from the first guess.
 
     A wrong frequency looks right where the plain fit has bent its parameters to stand for the right one.
     """
     best = next((s for s in scores if _rates(s).any()), None)
     if best is None or best.gain < RIVALS * scores[0].gain:
-        return []
+        return None
     quantities = best.candidate.attached.effect.quantities
     low, high = ([getattr(q, side) for q in quantities] for side in ("low", "high"))
     tried = [np.clip(np.where(_rates(best), ratio, 1.0) * best.numbers, low, high) for ratio in RATIOS]
-    return sorted((from_first_guess(space, best.candidate.attached, numbers) for numbers in tried), key=worth)
+    return min((from_first_guess(space, best.candidate.attached, numbers) for numbers in tried), key=worth)
 
 
 def _rates(score: Score) -> Bools:

@@ -7,16 +7,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from compass_ros.calibration.least_squares import (
-    Fit,
-    Point,
-    difference_steps,
-    linearise,
-    robust_loss,
-    robust_weight,
-)
+from compass_ros.calibration.least_squares import Fit, difference_steps, linearise, robust_loss, robust_weight
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import ROBUST, Refined, calmed, covariance, fitted_launches
+from compass_ros.calibration.refine import ROBUST, Refined, calmed, covariance, with_launches
 from compass_ros.discovery.joint import Joint
 
 HELD_OUT_SHARE = 0.4
@@ -88,7 +81,7 @@ def unexpected(judge: Likelihood, refined: Refined) -> bool:
 
 def held_out(judge: Likelihood, fitted: Likelihood, fit: Fit) -> HeldOut:
     """Weigh held-out episodes: frames that the parameters move too much are trusted less, as in the fit."""
-    linear = linearise(judge, launched(judge, fit), fit.free, difference_steps(fit.linear))
+    linear = linearise(judge, with_launches(judge, fit.point.values), fit.free, difference_steps(fit.linear))
     calm = calmed(judge, linear)
     floor = noise_cost(calm, replace(fit, free=np.zeros(0, dtype=np.int64)))
     return HeldOut(calm, surprise(calm, fitted, fit), floor)
@@ -103,7 +96,7 @@ def surprise(unseen: Likelihood, fitted: Likelihood, fit: Fit) -> float:
     weighed down as in the fit.
     """
     judged = fitted.on(unseen)
-    point = launched(judged, fit)
+    point = with_launches(judged, fit.point.values)
     linear = linearise(judged, point, fit.free, difference_steps(fit.linear))
     p, random = len(fit.free), judged.launch_std > 0
     own = block_diag(*linear.launch_jacobian.reshape(len(judged.inputs), judged.measured[0].size, -1))
@@ -120,11 +113,6 @@ def surprise(unseen: Likelihood, fitted: Likelihood, fit: Fit) -> float:
     loss = 0.5 * float(np.sum(robust_loss(left, ROBUST)))
     volume = np.linalg.slogdet(inner)[1] - np.linalg.slogdet(inner[p:, p:])[1] - np.linalg.slogdet(precision)[1]
     return loss + 0.5 * float((away + move) @ precision @ (away + move)) + 0.5 * float(volume)
-
-
-def launched(likelihood: Likelihood, fit: Fit) -> Point:
-    """A fit's parameters on other episodes, each with the launch that agrees best with it."""
-    return Point(fit.point.values, fitted_launches(likelihood, fit.point.values), np.inf)
 
 
 def noise_cost(likelihood: Likelihood, fit: Fit) -> float:

@@ -48,7 +48,7 @@ def test_nothing_is_left_of_what_was_explained(tilted: Space) -> None:
 
 def test_a_local_push_shows_where_it_is() -> None:
     centre, radius = planned_space().pushes.paths[0, 7, 0, :2], 0.08
-    space = space_of(recorded(Attached(EFFECTS["fan_field"], PUCKS), [0.03, *centre, radius]))
+    space = space_of(recorded(Attached(EFFECTS["fan_field"], PUCKS), [0.03, *centre, radius, 0.0]))
     found = residual_map(space)
     assert found is not None
     x, y = np.meshgrid(found.x_m, found.y_m)

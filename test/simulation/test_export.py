@@ -42,7 +42,7 @@ def test_scene_and_effects_play_as_the_simulator_does(tmp_path: Path, calibrated
         calibrated[cell().index(name)] = 0.0
     effects = [Attached(EFFECTS["swirl"], ("puck1", "puck2")), Attached(EFFECTS["local_wall"], ("right_wall",))]
     fitted = Simulator(cell(), effects, threads=1)
-    values = np.concatenate([calibrated, [0.2, 0.1, 0.0, 0.1], [0.003, -0.3]])
+    values = np.concatenate([calibrated, [0.2, 0.1, 0.0, 0.1, 0.6], [0.003, -0.3]])
     write_scene(cell(), calibrated, tmp_path / "scene.xml")
     write_effects_of(fitted, values, None, cell(), calibrated, tmp_path / "effects.yaml")
 
@@ -68,13 +68,14 @@ def test_without_effects_the_tables_friction_is_written(tmp_path: Path, calibrat
 
 def test_values_and_errors_of_each_effect_find_their_place(tmp_path: Path) -> None:
     effects = [Attached(EFFECTS["swirl"], ("puck1",)), Attached(EFFECTS["magnus"], ("puck2",))]
-    values = np.append(cell().defaults, [1.0, 0.1, 0.2, 0.3, 0.5])
-    std = np.append(np.zeros(64), [0.1, 0.2, 0.3, 0.4, 0.5])
+    values = np.append(cell().defaults, [1.0, 0.1, 0.2, 0.3, 0.4, 0.5])
+    std = np.append(np.zeros(64), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
     fitted = simulator().with_effects(effects)
     write_effects_of(fitted, values, std, cell(), cell().defaults, tmp_path / "effects.yaml")
     swirl, magnus = read_effects(tmp_path / "effects.yaml").effects
-    assert (swirl.attached, swirl.values, swirl.std) == (effects[0], (1.0, 0.1, 0.2, 0.3), (0.1, 0.2, 0.3, 0.4))
-    assert (magnus.attached, magnus.values, magnus.std) == (effects[1], (0.5,), (0.5,))
+    assert (swirl.attached, swirl.values) == (effects[0], (1.0, 0.1, 0.2, 0.3, 0.4))
+    assert swirl.std == (0.1, 0.2, 0.3, 0.4, 0.5)
+    assert (magnus.attached, magnus.values, magnus.std) == (effects[1], (0.5,), (0.6,))
 
 
 def test_mujoco_writes_other_models_as_before(tmp_path: Path) -> None:

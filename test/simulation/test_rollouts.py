@@ -71,9 +71,9 @@ def test_parameters_of_effects_follow_those_of_the_cell() -> None:
         [Attached(EFFECTS["swirl"], ("puck1", "puck2")), Attached(EFFECTS["camera_scale"], ())]
     )
     names = [p.name for p in both.parameters[64:]]
-    assert names == [*(f"puck1+puck2@swirl@{q}" for q in ("strength", "centre_x", "centre_y", "radius")),
+    assert names == [*(f"puck1+puck2@swirl@{q}" for q in ("strength", "centre_x", "centre_y", "radius", "tail")),
                      "cell@camera_scale@scale"]  # fmt: skip
-    assert both.defaults[64:].tolist() == [0.0, 0.0, 0.0, 0.12, 0.0]
+    assert both.defaults[64:].tolist() == [0.0, 0.0, 0.0, 0.12, 0.5, 0.0]
 
 
 @pytest.mark.parametrize(

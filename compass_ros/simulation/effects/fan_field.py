@@ -1,7 +1,8 @@
 """A push outwards from a point, as above a fan.
 
-F = m strength (r / radius) exp((1 - r^2 / radius^2) / 2) away from the centre; the peak, `strength`, lies at `radius`.
-Source: a smooth one-peaked profile of a radial wall jet; the exact profile matters little at the resolution of a puck.
+F = m strength u (1 + tail (u^2 - 1) / 2)^(-1 / tail), u = r / radius, away from the centre; peak at u = 1.
+A tail of 0 is the limit u exp((1 - u^2) / 2), a tail of 1 falls as 1 / r, as the speed of a radial wall jet does.
+Source: one-peaked profiles of radial jets (Glauert, J. Fluid Mech. 1, 1956: speed falls about as 1 / r).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ EFFECT = Effect(
         Quantity("centre_x", "m", -0.45, 0.45, 0.05, amplitude=False, start=0.0),
         Quantity("centre_y", "m", -0.225, 0.225, 0.05, amplitude=False, start=0.0),
         Quantity("radius", "m", 0.03, 0.4, 0.03, amplitude=False, start=0.12),
+        Quantity("tail", "1", 0.0, 1.2, 0.3, amplitude=False, start=0.5),
     ),
     sentence="an outward push",
     forces=_forces,

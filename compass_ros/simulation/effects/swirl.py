@@ -1,7 +1,8 @@
 """A push around a point.
 
-F = m strength (r / radius) exp((1 - r^2 / radius^2) / 2) anticlockwise around the centre; the peak lies at `radius`.
-Source: Lamb-Oseen-like vortex with a finite core.
+F = m strength u (1 + tail (u^2 - 1) / 2)^(-1 / tail), u = r / radius, anticlockwise around the centre; peak at u = 1.
+A tail of 0 is the limit u exp((1 - u^2) / 2), a tail of 1 falls as 1 / r.
+Source: Kaufmann-Scully vortex (tail 1), Taylor vortex (tail 0), and the family between the two.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ EFFECT = Effect(
         Quantity("centre_x", "m", -0.45, 0.45, 0.05, amplitude=False, start=0.0),
         Quantity("centre_y", "m", -0.225, 0.225, 0.05, amplitude=False, start=0.0),
         Quantity("radius", "m", 0.03, 0.4, 0.03, amplitude=False, start=0.12),
+        Quantity("tail", "1", 0.0, 1.2, 0.3, amplitude=False, start=0.5),
     ),
     sentence="a push around a point",
     forces=_forces,

@@ -98,6 +98,10 @@ static Force along(const State* s, double magnitude, double creep) {   // agains
   return (Force){k * s->vx, k * s->vy, k * s->vz};
 }
 
+static double falling(double beyond, double tail) {   // exp(-beyond) without a tail, 1 / (1 + beyond) with a tail of 1
+  return exp(tail * fabs(beyond) < 1e-8 ? -beyond : -log1p(tail * beyond) / tail);
+}
+
 static Force evaluate(const Term* term, const State* s) {
   const double* p = term->number;
   const double rx = s->x - p[1], ry = s->y - p[2];   // used by the fields around a point
@@ -140,9 +144,9 @@ static Force evaluate(const Term* term, const State* s) {
       double k = s->mass * a * sqrt(ux * ux + uy * uy) / (p[2] * p[2]);
       return (Force){k * ux, k * uy, 0};
     }
-    case FAN:              // p: peak acceleration, centre x, y, radius of the peak
+    case FAN:              // p: peak acceleration, centre x, y, radius of the peak, tail
     case SWIRL: {
-      double k = s->mass * p[0] / p[3] * exp(0.5 * (1.0 - r * r / (p[3] * p[3])));
+      double k = s->mass * p[0] / p[3] * falling(0.5 * (r * r / (p[3] * p[3]) - 1.0), p[4]);
       return term->kind == FAN ? (Force){k * rx, k * ry, 0} : (Force){-k * ry, k * rx, 0};
     }
     case ATTRACTION: {     // p: peak acceleration, centre x, y, core radius; softened inverse square, peak at radius / sqrt(2)

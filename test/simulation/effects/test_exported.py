@@ -45,6 +45,7 @@ def test_values_carry_their_units(path: Path) -> None:
         "centre_x": "m",
         "centre_y": "m",
         "radius": "m",
+        "tail": "1",
     }
 
 

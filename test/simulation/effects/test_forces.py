@@ -21,9 +21,9 @@ def turned(r: Floats) -> Floats:
     return np.array([-r[1], r[0]])
 
 
-def radial(r: Floats, strength: float, x: float, y: float, radius: float) -> tuple[Floats, float]:
+def radial(r: Floats, strength: float, x: float, y: float, radius: float, tail: float) -> Floats:
     off = r - [x, y]
-    return off, strength / radius * np.exp(0.5 * (1 - off @ off / radius**2))
+    return np.asarray(strength / radius * (1 + tail * (off @ off / radius**2 - 1) / 2) ** (-1 / tail) * off)
 
 
 def wind(v: Floats, ax: float, ay: float, speed: float) -> Floats:
@@ -46,14 +46,8 @@ FORMULAS: dict[str, tuple[tuple[float, ...], Acceleration]] = {
     "viscous_drag": ((0.8,), lambda t, r, v: -0.8 * v),
     "quadratic_drag": ((3.0,), lambda t, r, v: -3.0 * np.linalg.norm(v) * v),
     "crosswind": ((0.2, -0.3, 1.2), lambda t, r, v: wind(v, 0.2, -0.3, 1.2)),
-    "fan_field": (
-        (0.5, -0.05, 0.1, 0.12),
-        lambda t, r, v: np.prod(np.array(radial(r, 0.5, -0.05, 0.1, 0.12), dtype=object)),
-    ),
-    "swirl": (
-        (0.5, -0.05, 0.1, 0.12),
-        lambda t, r, v: turned(radial(r, 0.5, -0.05, 0.1, 0.12)[0]) * radial(r, 0.5, -0.05, 0.1, 0.12)[1],
-    ),
+    "fan_field": ((0.5, -0.05, 0.1, 0.12, 0.7), lambda t, r, v: radial(r, 0.5, -0.05, 0.1, 0.12, 0.7)),
+    "swirl": ((0.5, -0.05, 0.1, 0.12, 0.7), lambda t, r, v: turned(radial(r, 0.5, -0.05, 0.1, 0.12, 0.7))),
     "point_attraction": ((0.7, 0.0, 0.1, 0.08), lambda t, r, v: attraction(r, 0.7, 0.0, 0.1, 0.08)),
     "friction_patch": (
         (0.1, -0.1, 0.05, 0.08),
@@ -132,18 +126,27 @@ def test_magnus_turns_a_path_into_a_circle() -> None:
     np.testing.assert_allclose(after, [0, 0.4, -0.4, 0], atol=4e-4)  # half a turn, anticlockwise, radius v / rate
 
 
-@pytest.mark.parametrize(
-    ("name", "radius"), [("fan_field", 0.2), ("swirl", 0.2), ("point_attraction", 0.2 / np.sqrt(2))]
-)
-def test_a_field_peaks_with_its_strength_at_its_radius(name: str, radius: float) -> None:
-    def push(r: float) -> float:
-        after = moved(
-            scene("planar", 1e-4), exported(name, (1.0, 0.05, 0.0, 0.2)), np.array([0.05 + r, 0.0]), np.zeros(2), 1e-3
-        )
-        return float(np.hypot(*after[2:]) / 1e-3)
+def pushed(name: str, r: float, tail: tuple[float, ...]) -> float:
+    """Acceleration [m/s^2] at a distance r [m] from the centre of a field of strength 1 and radius (or core) 0.2."""
+    field = exported(name, (1.0, 0.05, 0.0, 0.2, *tail))
+    after = moved(scene("planar", 1e-4), field, np.array([0.05 + r, 0.0]), np.zeros(2), 1e-3)
+    return float(np.hypot(*after[2:]) / 1e-3)
 
-    assert push(radius) == pytest.approx(1.0, rel=1e-3)
-    assert max(push(0.95 * radius), push(1.05 * radius)) < 1.0
+
+@pytest.mark.parametrize(
+    ("name", "radius", "tail"),
+    [("fan_field", 0.2, (0.0,)), ("swirl", 0.2, (0.3,)), ("swirl", 0.2, (1.2,)), ("point_attraction", 0.141421, ())],
+)
+def test_a_field_peaks_with_its_strength_at_its_radius(name: str, radius: float, tail: tuple[float, ...]) -> None:
+    assert pushed(name, radius, tail) == pytest.approx(1.0, rel=1e-3)
+    assert max(pushed(name, 0.95 * radius, tail), pushed(name, 1.05 * radius, tail)) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("tail", "far"), [(0.0, 3 * np.exp(-4)), (1e-10, 3 * np.exp(-4)), (1e-3, 3 * np.exp(-4)), (1.0, 0.6)]
+)
+def test_a_tail_of_one_falls_as_1_over_r_and_no_tail_as_a_bell_does(tail: float, far: float) -> None:
+    assert pushed("swirl", 0.6, (tail,)) == pytest.approx(far, rel=2e-2)
 
 
 def test_a_fast_stream_pushes_as_a_tilt_does() -> None:

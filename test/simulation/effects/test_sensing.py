@@ -88,7 +88,7 @@ def test_a_lag_is_so_many_filters_in_a_row(poles: int) -> None:
 
 
 def test_a_lag_with_the_spread_of_a_moving_average_is_nearly_one() -> None:
-    """The box has no third moment; what is left of the difference is a thousandth of the lag's motion."""
+    """The box has no third moment; what is left is a hundredth of what the lag makes."""
     w, box = 2 * np.pi * 2.0, 0.06
     sine = seen("tracking_lag", (box / 2, 3**-0.5), lambda t: np.repeat(np.sin(w * t)[:, :, None], 4, axis=2))
     mean = (np.cos(w * (TIME[0] - box)) - np.cos(w * TIME[0])) / (w * box)
