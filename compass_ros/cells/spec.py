@@ -10,7 +10,7 @@ from typing import Literal
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as validated
 
-from compass_ros.cells.start import ReleaseSpec, StartSpec
+from compass_ros.cells.start import Name, ReleaseSpec, StartSpec
 from compass_ros.errors import ConfigError, nearest, shown
 from compass_ros.types import Quantity
 
@@ -22,10 +22,10 @@ _UNKNOWN = "unexpected_keyword_argument"
 class ObjectSpec:
     """A tracked object."""
 
-    name: str = Field(max_length=200)
+    name: Name
     quantity: Quantity
-    topic: str = Field("", max_length=200)
-    body: str = Field("", max_length=200)
+    topic: Name = ""
+    body: Name = ""
     """Body (quantity `joint`: joint) of the scene; the object's own name where empty."""
 
 
@@ -33,24 +33,24 @@ class ObjectSpec:
 class FactorSpec:
     """One of the K parts of the state whose trajectory difference is measured."""
 
-    name: str = Field(max_length=200)
-    object: str = Field(max_length=200)
+    name: Name
+    object: Name
     part: Literal["all", "position", "orientation", "roll", "pitch", "yaw"] = "all"
     """Which numbers of the object's row."""
 
 
 @validated(frozen=True, config=_strict, kw_only=True)
 class ActionSpec:
-    name: str = Field(max_length=200)
-    unit: str = Field(max_length=200)
+    name: Name
+    unit: Name
     low: float
     high: float
     reach: tuple[float, float] | None = None
     """What the robot could do, where that is more than the action space; `compass plan` looks there."""
     description: str = ""
-    field: str = Field("", max_length=200)
+    field: Name = ""
     """Cells without code: what it sets, `qpos[0]` or `qvel[0]` of a joint at the start, or `ctrl` of an actuator."""
-    of: str = Field("", max_length=200)
+    of: Name = ""
     """Name of that joint or actuator."""
     from_s: float = Field(0.0, ge=0)
     """When a `ctrl` begins."""
@@ -60,17 +60,17 @@ class ActionSpec:
 
 @validated(frozen=True, config=_strict, kw_only=True)
 class ParameterSpec:
-    name: str = Field(max_length=200)
+    name: Name
     default: float
     bounds: tuple[float, float]
-    unit: str = Field(max_length=200)
+    unit: Name
     half_width: float = Field(gt=0)
     target: float | None = None
     """Value in the "real" simulator of the paper's sim-to-sim experiment."""
     description: str = ""
-    field: str = Field("", max_length=200)
+    field: Name = ""
     """Where the cell has no code of its own: field of mjModel, with its index as in `geom_friction[0]`."""
-    of: str = Field("", max_length=200)
+    of: Name = ""
     """Name of the element whose field it is."""
 
     @property
@@ -83,24 +83,24 @@ class ParameterSpec:
 class CellSpec:
     """The YAML, field by field."""
 
-    name: str = Field(max_length=200)
-    dynamics: str = Field(max_length=200)
-    model: str = Field(max_length=200)
+    name: Name
+    dynamics: Name
+    model: Name
     control_dt_s: float = Field(gt=0)
     horizon: int = Field(ge=1)
     objects: tuple[ObjectSpec, ...]
-    factors: tuple[str | FactorSpec, ...]
+    factors: tuple[Name | FactorSpec, ...]
     parameters: tuple[ParameterSpec, ...] = ()
     action: tuple[ActionSpec, ...] = ()
     noise_m: float = Field(0.001, gt=0)
-    launch_noise: Mapping[str, float] = Field(default_factory=dict)
+    launch_noise: Mapping[Name, float] = Field(default_factory=dict)
     start: tuple[StartSpec, ...] = ()
     """First states that an episode brings with it."""
     release: ReleaseSpec | None = None
     """When the motion begins, where that differs from episode to episode."""
     auto: bool = False
     """Every other tunable field of the scene becomes a parameter too."""
-    causal: tuple[str, ...] = ()
+    causal: tuple[Name, ...] = ()
     """Parameters that the paper found to be causes; used by benchmarks only."""
 
 

@@ -35,13 +35,15 @@ _GROUPS: Mapping[str, tuple[str, ...]] = {
 }
 _NS = 1e-9
 Deviation = Annotated[float, Field(ge=0)]
+Name = Annotated[str, Field(max_length=200)]
+"""Short enough for a message."""
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"), kw_only=True)
 class StartSpec:
     """Where the first state of an object comes from, and how far it may be wrong."""
 
-    object: str
+    object: Name
     velocity: Literal["track", "rest"] = "track"
     """Where the recording states no first velocity: from the first frames of the track, or zero."""
     frames: int = Field(5, ge=2)

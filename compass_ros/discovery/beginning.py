@@ -19,7 +19,7 @@ from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.joint import Joint, grown, widened
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import changes, screen
-from compass_ros.discovery.trials import TRIED, different, further, sketched
+from compass_ros.discovery.trials import TRIED, different, further, sketched, worth
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Quantity
 from compass_ros.types import Floats
@@ -31,7 +31,7 @@ SLIGHT = 2.0
 SIZES, AROUND = (0.5, 1.0, 4.0, 16.0), 12
 """Of an effect that is tried, in its scale; directions of two amplitudes."""
 FEW = 2
-"""Candidates that are followed to the end."""
+"""Forces that are followed to the end, and as many others."""
 
 
 @dataclass(frozen=True)
@@ -57,15 +57,23 @@ def from_the_beginning(
         return
     failed = beginning.failed
     space, scores = screen(simulator, failed.likelihood, failed.fit, asked)
+    forces = [s for s in scores if s.candidate.by_force]
     others = sorted((s for s in scores if not s.candidate.by_force), key=lambda s: -max(s.gain, _gain(space, s)))
-    begun = sorted((_begun(simulator, beginning, s.candidate) for s in others[:TRIED]), key=_left)
-    scores = [s for s in scores if s.candidate.by_force]
-    promising = [*sketched(space, scores)[:TRIED], *(_freed(j, beginning) for j in different(begun)[:FEW])]
-    tried = sorted((further(j, SLIGHT, 4) for j in promising), key=_left)
-    for joint in different(tried)[:FEW]:
+    begun = sorted((_begun(simulator, beginning, s.candidate) for s in _of_each_name(others)[:TRIED]), key=_left)
+    kinds = sketched(space, forces)[:TRIED], [_freed(joint, beginning) for joint in begun[:FEW]]
+    tried = [sorted((further(j, SLIGHT, 4) for j in promising), key=_left) for promising in kinds]
+    for joint in sorted((j for kind in tried for j in different(kind)[:FEW]), key=worth):
         all_objects = next(c.attached for c in asked if c.name == joint.name)
         sets = dict.fromkeys((joint.added[0], all_objects if all_objects.effect.on == "objects" else joint.added[0]))
         yield [grown(joint, attached, simulator, likelihood, fit.robust) for attached in sets]
+
+
+def _of_each_name(scores: Sequence[Score]) -> list[Score]:
+    """The first of each effect."""
+    first: dict[str, Score] = {}
+    for s in scores:
+        first.setdefault(s.candidate.name, s)
+    return list(first.values())
 
 
 def _left(joint: Joint) -> float:

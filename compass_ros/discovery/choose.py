@@ -195,7 +195,7 @@ def _in_pairs(choice: Choice, space: Space, candidates: Sequence[Candidate], uns
     firsts = [best] if choice.share(best) > LEADS else [best, *(converge(j, slight, 4) for j in others[:1])]
     pairs = _pairs(firsts, candidates, slight)
     if pairs:
-        alone = [further(_alone(pairs[0], i, space), slight, 5) for i in (0, 1)]
+        alone = [further(_one_of(pairs[0], i, space), slight, 5) for i in (0, 1)]
         choice = choice.of(sorted([*alone, *choice.singles], key=worth))
         if choice.good(unseen):
             return _concluded(choice, candidates, unseen)
@@ -277,7 +277,7 @@ def evidence(joint: Joint, unseen: HeldOut) -> float:
     return -worth(joint) - unseen.surprise(joint) / joint.likelihood.correlation_time
 
 
-def _alone(pair: Joint, i: int, space: Space) -> Joint:
+def _one_of(pair: Joint, i: int, space: Space) -> Joint:
     """One effect of a pair without the other, fitted from where the pair stands.
 
     The second, since the first was chosen when nothing stood beside it; and either, since the way there may have led

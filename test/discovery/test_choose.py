@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.choose import _alone
+from compass_ros.discovery.choose import _one_of
 from compass_ros.discovery.joint import fit_jointly
 from compass_ros.discovery.screen import Score
 from compass_ros.simulation.effects import EFFECTS, Attached
@@ -24,7 +24,7 @@ def test_one_of_a_pair_that_does_nothing_can_be_left_out_and_the_other_cannot(sw
     scores = [Score(Candidate(TILT), np.array([1e-4, 1e-4]), 1.0, nothing)]
     scores.insert(swirl_at, Score(Candidate(SWIRL), np.array(PLANTED) * [0.8, 0.9, 1.1, 1.1, 1.0], 100.0, nothing))
     pair = fit_jointly(space, scores, 4)
-    swirl, tilt = _alone(pair, swirl_at, space), _alone(pair, 1 - swirl_at, space)
+    swirl, tilt = _one_of(pair, swirl_at, space), _one_of(pair, 1 - swirl_at, space)
     assert (swirl.name, tilt.name) == ("swirl", "table_tilt")
     assert swirl.fit.point.cost < pair.fit.point.cost + 3.0
     assert tilt.fit.point.cost > 2.0 * pair.fit.point.cost
