@@ -59,21 +59,13 @@ def from_the_beginning(
     space, scores = screen(simulator, failed.likelihood, failed.fit, asked)
     forces = [s for s in scores if s.candidate.by_force]
     others = sorted((s for s in scores if not s.candidate.by_force), key=lambda s: -max(s.gain, _gain(space, s)))
-    begun = sorted((_begun(simulator, beginning, s.candidate) for s in _of_each_name(others)[:TRIED]), key=_left)
+    begun = sorted((_begun(simulator, beginning, s.candidate) for s in different(others)[:TRIED]), key=_left)
     kinds = sketched(space, forces)[:TRIED], [_freed(joint, beginning) for joint in begun[:FEW]]
     tried = [sorted((further(j, SLIGHT, 4) for j in promising), key=_left) for promising in kinds]
     for joint in sorted((j for kind in tried for j in different(kind)[:FEW]), key=worth):
         all_objects = next(c.attached for c in asked if c.name == joint.name)
         sets = dict.fromkeys((joint.added[0], all_objects if all_objects.effect.on == "objects" else joint.added[0]))
         yield [grown(joint, attached, simulator, likelihood, fit.robust) for attached in sets]
-
-
-def _of_each_name(scores: Sequence[Score]) -> list[Score]:
-    """The first of each effect."""
-    first: dict[str, Score] = {}
-    for s in scores:
-        first.setdefault(s.candidate.name, s)
-    return list(first.values())
 
 
 def _left(joint: Joint) -> float:

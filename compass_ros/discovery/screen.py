@@ -38,6 +38,10 @@ class Score:
     tangent: Floats
     """(D,) change of the weighted residual by the whole effect, not projected; D residuals of all episodes."""
 
+    @property
+    def name(self) -> str:
+        return self.candidate.name
+
 
 class Space:
     """Weighted residuals and tangents at a fit, with the parameters' part taken out on demand. D = E * F * C."""
@@ -178,8 +182,7 @@ def _best_shapes(space: Space, candidate: Candidate) -> Floats:
     bounds = [(quantities[i].low, quantities[i].high) for i in shape_of]
     options = {"maxfev": 60 * len(shape_of), "xatol": 1e-4, "fatol": 1e-2}
     found = [minimize(fall, points[i], method="Nelder-Mead", bounds=bounds, options=options) for i in starts]
-    best = min(found, key=lambda one: float(one.fun))
-    return at(best.x if best.fun < falls[starts[0]] else points[starts[0]])
+    return at(min(found, key=lambda one: float(one.fun)).x)
 
 
 def _at(space: Space, candidate: Candidate, shapes: Floats) -> tuple[Floats, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from compass_ros.calibration.least_squares import minimise
 from compass_ros.discovery.joint import Joint, fit_jointly, from_first_guess
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.types import Bools
+
+Named = TypeVar("Named", Joint, Score)
 
 SKETCHED = 2
 """Steps of a sketch."""
@@ -63,11 +66,11 @@ def worth(joint: Joint) -> float:
     return -joint.log_evidence(joint.likelihood.correlation_time)
 
 
-def different(singles: Sequence[Joint]) -> list[Joint]:
-    """The best fit of each name."""
-    seen: dict[str, Joint] = {}
-    for joint in singles:
-        seen.setdefault(joint.name, joint)
+def different(ordered: Sequence[Named]) -> list[Named]:
+    """The first, and so the best, of each name."""
+    seen: dict[str, Named] = {}
+    for one in ordered:
+        seen.setdefault(one.name, one)
     return list(seen.values())
 
 
