@@ -110,6 +110,7 @@ def pose(simulator: Simulator, data: Recordings, noise: Noise) -> Problem:
     replay = Replay(simulator, data)
     likelihood = Likelihood(
         predict=simulator.observe,
+        predict_alike=simulator.observe_alike,
         parameters=simulator.parameters,
         inputs=data.inputs,
         time_s=data.time_s,

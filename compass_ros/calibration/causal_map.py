@@ -9,7 +9,9 @@ weight drops one, and more than noise. The values are the maximum a posteriori o
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -35,10 +37,13 @@ def causal_map_refined(problem: Problem, report: Report) -> tuple[Estimate, Refi
     trace: list[Iteration] = []
     spent = 0
 
-    def predict(values: Floats, inputs: Floats, time_s: Floats) -> Floats:
-        nonlocal spent
-        spent += len(values)
-        return problem.likelihood.predict(values, inputs, time_s)
+    def counted(play: Callable[..., Any]) -> Callable[..., Any]:
+        def played(values: Floats, *rest: object) -> Any:
+            nonlocal spent
+            spent += len(values)
+            return play(values, *rest)
+
+        return played
 
     def watch(stage: str, done: float, point: Point) -> bool:
         nonlocal spent
@@ -48,7 +53,9 @@ def causal_map_refined(problem: Problem, report: Report) -> tuple[Estimate, Refi
         return report(Progress(stage, len(trace), 0.95 * done, float(d.mean()), float("nan")))
 
     watch("screen", 0.0, start(problem.likelihood, problem.start))
-    refined = refine(replace(problem.likelihood, predict=predict), problem.start, watch)
+    known = problem.likelihood
+    alike = known.predict_alike and counted(known.predict_alike)
+    refined = refine(replace(known, predict=counted(known.predict), predict_alike=alike), problem.start, watch)
     return to_estimate(problem, refined, tuple(trace)), refined
 
 

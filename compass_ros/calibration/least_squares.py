@@ -15,6 +15,8 @@ from compass_ros.types import Bools, Floats, Ints
 
 FIRST_STEP = 0.02
 """First finite differences, in standard deviations of the prior."""
+MARGIN_S = 0.1
+"""How much earlier than at a point nearby a parameter may begin to act [s]."""
 _TRIALS = np.array([0.01, 1.0, 100.0])
 """Damping factors tried at once, relative to the current one."""
 
@@ -41,6 +43,9 @@ class Linear:
     """(E, F, C, p) change of the residual per prior standard deviation of each free parameter."""
     launch_jacobian: Floats
     """(E, F, C, l) change of the episode's own residual per standard deviation of its launch."""
+    onset: Floats
+    """(E, p) simulated time up to which a parameter did nothing in an episode [s], there where differences were taken;
+    what the simulator need not repeat when they are taken anew nearby."""
 
 
 @dataclass(frozen=True)
@@ -102,8 +107,11 @@ def inward(likelihood: Likelihood, point: Point, which: Ints, steps: Floats) -> 
     return np.where((there > likelihood.high[which]) | (there < likelihood.low[which]), -changes, changes)
 
 
-def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats) -> Linear:
-    """Residual and one-sided differences at a point; (p,) steps in standard deviations of the prior, as in `inward`."""
+def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats, onset: Floats | None = None) -> Linear:
+    """Residual and one-sided differences at a point; (p,) steps in standard deviations of the prior, as in `inward`.
+
+    `onset`: as in `Linear`, at a point nearby.
+    """
     episodes = len(likelihood.inputs)
     random = np.flatnonzero(likelihood.launch_std > 0)
     steps = inward(likelihood, point, free, steps)
@@ -115,19 +123,25 @@ def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats) -
     for i, column in enumerate(random):
         inputs[1 + len(free) + i, :, column] += 0.1 * likelihood.launch_std[column]
     index = np.tile(np.arange(episodes), columns)
-    flat = likelihood.residual(values.reshape(-1, values.shape[2]), inputs.reshape(-1, inputs.shape[2]), index)
+    until = np.zeros((columns, episodes))
+    if onset is not None:
+        until[1 : 1 + len(free)] = np.maximum(onset.T - MARGIN_S, 0.0)
+    flat, same = likelihood.residual_alike(
+        values.reshape(-1, values.shape[2]), inputs.reshape(-1, inputs.shape[2]), index, index, until.ravel()
+    )
     residual = flat.reshape(columns, episodes, *flat.shape[1:])
     scale = likelihood.prior_std[free] / steps
     jacobian = np.moveaxis((residual[1 : 1 + len(free)] - residual[0]) * scale[:, None, None, None], 0, -1)
     launch = np.moveaxis((residual[1 + len(free) :] - residual[0]) * 10.0, 0, -1)
-    return Linear(residual[0], jacobian, launch)
+    return Linear(residual[0], jacobian, launch, same.reshape(columns, episodes)[1 : 1 + len(free)].T)
 
 
-def central(likelihood: Likelihood, point: Point, free: Ints, steps: Floats) -> Linear:
+def central(likelihood: Likelihood, point: Point, free: Ints, steps: Floats, onset: Floats | None = None) -> Linear:
     """The same with central differences: exact to second order, for twice the rollouts."""
-    up, down = linearise(likelihood, point, free, steps), linearise(likelihood, point, free, -steps)
+    up = linearise(likelihood, point, free, steps, onset)
+    down = linearise(likelihood, point, free, -steps, up.onset)
     jacobian = 0.5 * (up.jacobian + down.jacobian)
-    return Linear(up.residual, jacobian, up.launch_jacobian)
+    return Linear(up.residual, jacobian, up.launch_jacobian, np.minimum(up.onset, down.onset))
 
 
 def moved(likelihood: Likelihood, point: Point, free: Ints, move: Floats) -> Point:
@@ -189,6 +203,7 @@ def minimise(
     fresh: bool = True,
     steps: Floats | None = None,
     anew: bool = True,
+    onset: Floats | None = None,
 ) -> Fit:
     """Levenberg-Marquardt from a point until a step would lower the cost by less than `tolerance` (log likelihood).
 
@@ -196,19 +211,20 @@ def minimise(
     it going, which costs no rollout. `linear`: differences that are known already near the point. `fresh`: end with
     differences at the solution, as standard errors need them. `steps`: (p,) of the first differences, where known.
     `anew`: False: a sketch of the fit from `linear` alone, for a tenth of the rollouts; it ends where that fails.
+    `onset`: (E, p) where it is known at a point nearby and `linear` is not.
     """
     damping = 1e-3
     steps = np.full(len(free), FIRST_STEP) if steps is None else steps
     costs, residuals = cost(likelihood, [point], robust)
     point, exact = replace(point, cost=float(costs[0])), False
     if linear is not None:
-        linear, steps = replace(linear, residual=residuals[0]), difference_steps(linear)
+        linear, steps, onset = replace(linear, residual=residuals[0]), difference_steps(linear), linear.onset
     iteration, converged = 0, False
     while iteration < iterations and not converged:
         iteration += 1
         if linear is None:
-            linear, steps = _linearise_well(likelihood, point, free, steps)
-            exact = True
+            linear, steps = _linearise_well(likelihood, point, free, steps, onset)
+            onset, exact = linear.onset, True
         hessian, gradient = normal_equations(likelihood, point, linear, free, robust)
         trials = [damped_step(likelihood, point, free, hessian, gradient, damping * factor) for factor in _TRIALS]
         costs, residuals = cost(likelihood, trials, robust)
@@ -231,16 +247,18 @@ def minimise(
         else:
             break
     if linear is None or (fresh and not exact):
-        linear, _ = _linearise_well(likelihood, point, free, steps)
+        linear, _ = _linearise_well(likelihood, point, free, steps, onset)
     return Fit(point, linear, free, robust, iteration, converged)
 
 
-def _linearise_well(likelihood: Likelihood, point: Point, free: Ints, steps: Floats) -> tuple[Linear, Floats]:
+def _linearise_well(
+    likelihood: Likelihood, point: Point, free: Ints, steps: Floats, onset: Floats | None
+) -> tuple[Linear, Floats]:
     """Differences, taken once more where the steps were far too long; and the steps for the next time."""
-    linear = linearise(likelihood, point, free, steps)
+    linear = linearise(likelihood, point, free, steps, onset)
     better = difference_steps(linear)
     if np.any(better < 0.25 * steps):
-        linear = linearise(likelihood, point, free, np.minimum(steps, better))
+        linear = linearise(likelihood, point, free, np.minimum(steps, better), linear.onset)
         better = difference_steps(linear)
     return linear, better
 
@@ -262,10 +280,11 @@ def _broyden(linear: Linear, residual: Floats, move: Floats) -> Linear:
     missed = residual - predicted
     length = np.sum(move[:p] ** 2) + np.sum(launches**2, axis=1)  # (E,)
     share = missed / np.maximum(length, 1e-300)[:, None, None]
-    return Linear(
-        residual,
-        linear.jacobian + share[..., None] * move[:p],
-        linear.launch_jacobian + share[..., None] * launches[:, None, None],
+    return replace(
+        linear,
+        residual=residual,
+        jacobian=linear.jacobian + share[..., None] * move[:p],
+        launch_jacobian=linear.launch_jacobian + share[..., None] * launches[:, None, None],
     )
 
 

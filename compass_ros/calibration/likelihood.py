@@ -16,6 +16,12 @@ from compass_ros.types import Floats, Ints, Parameter
 Predict = Callable[[Floats, Floats, Floats], Floats]
 """(B, P) values, (B, A) inputs, (B, F) times [s] -> (B, F, C) what the tracker would say: the door to a simulator."""
 
+PredictAlike = Callable[[Floats, Floats, Floats, Ints, Floats], tuple[Floats, Floats]]
+"""The same where row b is known to move as row like[b] does until until[b] [s of simulated time].
+
+Returned is also until when it really did (`Simulator.observe_alike`).
+"""
+
 
 @dataclass(frozen=True)
 class Likelihood:
@@ -39,6 +45,8 @@ class Likelihood:
     """(P,)"""
     prior_std: Floats
     """(P,)"""
+    predict_alike: PredictAlike | None = None
+    """None: `predict`, and nothing is known of what rows have in common."""
 
     @property
     def low(self) -> Floats:
@@ -76,5 +84,16 @@ class Likelihood:
 
     def residual(self, values: Floats, inputs: Floats, episode: Ints) -> Floats:
         """(B, F, C) residuals in sigma for (B, P) values and (B, A) inputs; 0 where nothing was measured."""
-        predicted = self.predict(values, inputs, self.time_s[episode])
+        return self._missed(self.predict(values, inputs, self.time_s[episode]), episode)
+
+    def residual_alike(
+        self, values: Floats, inputs: Floats, episode: Ints, like: Ints, until: Floats
+    ) -> tuple[Floats, Floats]:
+        """The same for rows that begin as others do, and until when they really do [s]; as in `PredictAlike`."""
+        if self.predict_alike is None:
+            return self.residual(values, inputs, episode), np.zeros(len(values))
+        predicted, same = self.predict_alike(values, inputs, self.time_s[episode], like, until)
+        return self._missed(predicted, episode), same
+
+    def _missed(self, predicted: Floats, episode: Ints) -> Floats:
         return np.asarray(np.nan_to_num((predicted - self.measured[episode]) / self.sigma[episode]))

@@ -86,6 +86,8 @@ class Influence:
     """(P, P) products of the changes; `strength` is the root of its diagonal."""
     changes: Floats
     """(E, F, C, P) of the observations by one prior width [m or rad]; 0 where nothing was measured."""
+    onset: Floats
+    """(E, P) as in `Linear`."""
 
     def felt(self, least: float, share: float) -> Ints:
         """Parameters that move the recordings by more than `least` sigma.
@@ -134,14 +136,14 @@ def growing(likelihood: Likelihood, values: Floats, held: Ints = NONE) -> Iterat
     few = some(likelihood)
     first, share_asked = sensitivity(few, start(few, values)), len(few.inputs) / len(likelihood.inputs)
     strong = np.setdiff1d(first.felt(STRONG * np.sqrt(share_asked), STRONG_SHARE), held)
-    steps = first.steps.copy()
+    steps, onset = first.steps.copy(), None
     for share in HORIZONS:
         part = likelihood.until(share * float(likelihood.time_s.max()))
         robust = max(ROBUST, 3.0 * typical_residual(part, point))
         last = share == HORIZONS[-1]
         tolerance = 1.0 if last else 5.0
-        fit = minimise(part, point, strong, 4, robust, tolerance, steps=steps[strong], fresh=last)
-        point, steps[strong] = fit.point, difference_steps(fit.linear)
+        fit = minimise(part, point, strong, 4, robust, tolerance, steps=steps[strong], fresh=last, onset=onset)
+        point, steps[strong], onset = fit.point, difference_steps(fit.linear), fit.linear.onset
         yield part, fit
 
 
@@ -176,7 +178,10 @@ def freed(
     free = np.union1d(influence.felt(FELT, FELT_SHARE), also)
     robust = max(least, 3.0 * typical_residual(likelihood, point))
     steps = influence.steps[free]
-    return influence, minimise(likelihood, point, free, iterations, robust, tolerance=3.0, steps=steps, fresh=False)
+    fit = minimise(
+        likelihood, point, free, iterations, robust, 3.0, steps=steps, fresh=False, onset=influence.onset[:, free]
+    )
+    return influence, fit
 
 
 def some(likelihood: Likelihood) -> Likelihood:
@@ -198,7 +203,8 @@ def settled(likelihood: Likelihood, fit: Fit) -> Fit:
         poor = 2 * point.cost > UNEXPLAINED * likelihood.measurements
         if taken >= 2 and poor and gained < WORTHWHILE * (point.cost - 0.5 * likelihood.measurements):
             break
-        linear = central(likelihood, point, free, FINE[taken % len(FINE)] * difference_steps(linear))
+        steps = FINE[taken % len(FINE)] * difference_steps(linear)
+        linear = central(likelihood, point, free, steps, linear.onset if taken else None)
         before = point.cost
         for _ in range(SERVE):
             best, residual = _best_step(likelihood, point, linear, free, robust)
@@ -261,8 +267,11 @@ def calmed(likelihood: Likelihood, linear: Linear) -> Likelihood:
 def scaled(linear: Linear, old: Likelihood, new: Likelihood) -> Linear:
     """Differences in the sigma of another likelihood of the same recordings."""
     share = old.sigma / new.sigma
-    return Linear(
-        linear.residual * share, linear.jacobian * share[..., None], linear.launch_jacobian * share[..., None]
+    return replace(
+        linear,
+        residual=linear.residual * share,
+        jacobian=linear.jacobian * share[..., None],
+        launch_jacobian=linear.launch_jacobian * share[..., None],
     )
 
 
@@ -277,7 +286,9 @@ def sensitivity(likelihood: Likelihood, point: Point) -> Influence:
     columns = coarse.jacobian.reshape(-1, len(asked))
     gram[np.ix_(asked, asked)] = columns.T @ columns
     changes[..., asked] = coarse.jacobian * likelihood.sigma[..., None]
-    return Influence(point, strength, steps, gram, changes)
+    onset = np.zeros((len(likelihood.inputs), count))
+    onset[:, asked] = coarse.onset
+    return Influence(point, strength, steps, gram, changes, onset)
 
 
 def typical_residual(likelihood: Likelihood, point: Point) -> float:

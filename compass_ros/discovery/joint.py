@@ -61,6 +61,7 @@ def widened(simulator: Simulator, likelihood: Likelihood, added: Sequence[Attach
     return wider, replace(
         likelihood,
         predict=wider.observe,
+        predict_alike=wider.observe_alike,
         parameters=wider.parameters,
         prior_mean=np.concatenate([likelihood.prior_mean, mean]),
         prior_std=np.concatenate([likelihood.prior_std, std]),
@@ -180,4 +181,5 @@ def _extended(space: Space, likelihood: Likelihood, point: Point, residual: Floa
     there = likelihood.residual(np.repeat(values, episodes, axis=0), inputs, index)
     change = there.reshape(len(new), *residual.shape) - residual
     scaled = np.moveaxis(change * (likelihood.prior_std[new] / steps)[:, None, None, None], 0, -1)
-    return Linear(residual, np.concatenate([old.jacobian, scaled], axis=-1), old.launch_jacobian)
+    onset = np.concatenate([old.onset, np.zeros((episodes, len(new)))], axis=1)
+    return Linear(residual, np.concatenate([old.jacobian, scaled], axis=-1), old.launch_jacobian, onset)

@@ -69,6 +69,7 @@ def likelihood_of(simulator: Simulator, data: Recordings, unknowns: Sequence[Unk
     launch = simulator.cell.launch_std
     return Likelihood(
         predict=simulator.observe,
+        predict_alike=simulator.observe_alike,
         parameters=simulator.parameters,
         inputs=data.inputs,
         time_s=data.time_s,

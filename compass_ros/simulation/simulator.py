@@ -15,6 +15,7 @@ from compass_ros.cells import Cell
 from compass_ros.cells.dynamics import Dynamics
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.errors import ConfigError
+from compass_ros.simulation.alike import roll_alike
 from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.effect import Context, Effect, Sample, restore
 from compass_ros.simulation.native.program import (
@@ -30,6 +31,9 @@ from compass_ros.types import QUANTITY_SIZE, Floats, Ints, Parameter, Unit
 
 CHUNK = 128
 """Rollouts held in memory at once; 128 of 2.5 s at 1 ms take 45 MB."""
+
+TOGETHER = 512
+"""Rollouts that branch off others, with those: their states are held in memory too."""
 
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS.value
 
@@ -186,6 +190,29 @@ class Simulator:
         ]
         return np.concatenate(parts)
 
+    def observe_alike(
+        self, values: Floats, inputs: Floats, time_s: Floats, like: Ints, until: Floats
+    ) -> tuple[Floats, Floats]:
+        """The same for rows that move as row like[b] up to simulated time until[b] [s], without simulating that again.
+
+        (B,) like: a row that others are like is like itself. Returned is also up to when each row really was as its
+        other one, by comparison of all states; a row whose `until` is seen to be too late is simulated as a whole.
+        Where MuJoCo has sensors everything is simulated.
+        """
+        observed, same = np.empty(0), np.zeros(len(values))
+        if self._model.nsensordata:
+            return self.observe(values, inputs, time_s), same
+        models, of = np.unique(like, return_inverse=True)
+        size = max(TOGETHER // max(int(np.bincount(of).max()), 1), 1)
+        for i in range(0, len(models), size):
+            rows = np.flatnonzero((of >= i) & (of < i + size))
+            there = np.searchsorted(rows, like[rows])
+            part, same[rows] = self._observe_together(values[rows], inputs[rows], time_s[rows], there, until[rows])
+            if not observed.size:
+                observed = np.empty((len(values), *part.shape[1:]))
+            observed[rows] = part
+        return observed, same
+
     def bodies(self, values: Floats, action: Floats, time_s: Floats) -> dict[str, Floats]:
         """(F, 3) x, y [m], yaw [rad] of each moving body of a planar cell as the camera sees it; for drawings."""
         duration = float(np.max(time_s))
@@ -207,11 +234,38 @@ class Simulator:
         rows = np.where(np.array(columns) >= 0, rows, 0.0).reshape(*rows.shape[:2], len(names), 4)
         return np.asarray(rows + np.array(rest))
 
+    def _observe_together(
+        self, values: Floats, inputs: Floats, time_s: Floats, like: Ints, until: Floats
+    ) -> tuple[Floats, Floats]:
+        """As `observe_alike`. Where start or commands differ, rows differ from there on, whatever was said."""
+        steps = self._steps(self._duration(values, inputs, time_s))
+        start, controls = self._begin(values, inputs, steps)
+        known = np.minimum(until / self.time_step, steps).astype(int)
+        if controls is not None:
+            commanded = (controls != controls[like]).any(axis=2)
+            known = np.minimum(known, np.where(commanded.any(axis=1), commanded.argmax(axis=1), steps))
+        known[(start != start[like]).any(axis=1)] = 0
+
+        def play(rows: Ints, begin: Floats, step: int) -> Floats:
+            return self._play(values[rows], begin, None if controls is None else controls[rows, step:], steps - step)[0]
+
+        columns = 1 + self._dynamics.columns()
+        states, same = roll_alike(play, start, steps, columns, like, known, CHUNK)
+        positions = self._dynamics.observe(self._of_cell(values), states)
+        return self._sensed(values, inputs, time_s, positions), same * self.time_step
+
     def _observe_chunk(self, values: Floats, inputs: Floats, time_s: Floats) -> Floats:
+        positions = self._chunk(values, inputs, self._duration(values, inputs, time_s))
+        return self._sensed(values, inputs, time_s, positions)
+
+    def _duration(self, values: Floats, inputs: Floats, time_s: Floats) -> float:
+        """How long to simulate for what is asked [s]."""
         last = float(np.nanmax(time_s))
         ahead = sum(a.effect.ahead(numbers, last) for a, numbers in self._split(values) if a.effect.ahead is not None)
-        duration = float(np.nanmax(self.cell.simulated_time(inputs, time_s))) + ahead
-        positions = self._chunk(values, inputs, duration)
+        return float(np.nanmax(self.cell.simulated_time(inputs, time_s))) + ahead
+
+    def _sensed(self, values: Floats, inputs: Floats, time_s: Floats, positions: Floats) -> Floats:
+        """(B, F, C) what the tracker says of (B, T + 1, C) positions."""
 
         def perfect(time: Floats) -> Floats:
             return _interpolate(positions, self.time_step, self.cell.simulated_time(inputs, time))
@@ -229,24 +283,37 @@ class Simulator:
 
     def _roll(self, values: Floats, inputs: Floats, duration: float, columns: Ints) -> Floats:
         """(B, T + 1, n) the given places of (qpos, qvel, act, sensordata), the start first."""
-        batch, steps = len(values), max(int(np.ceil(duration / self.time_step)), 1)
-        steps += bool(self._model.nsensordata)  # sensors speak of the state before a step
-        while len(self._models) < batch:
-            self._models.append(copy.copy(self._model))
-        models = self._models[:batch]
-        self._write(models, values)
-        start = np.zeros((batch, mujoco.mj_stateSize(self._model, _STATE)))
-        nq, nv = self._model.nq, self._model.nv
-        start[:, 1 : 1 + nq], start[:, 1 + nq : 1 + nq + nv] = self._dynamics.start(self._of_cell(values), inputs)
-        controls = self._controls(values, inputs, steps) if self._model.nu else None
-        with Programs(models, self._terms(values)):
-            states, sensors = self._pool.rollout(models, self._data, start, controls, nstep=steps)
-        self._spent.rollouts += batch
-        self._spent.seconds += batch * steps * self.time_step
+        steps = self._steps(duration)
+        start, controls = self._begin(values, inputs, steps)
+        states, sensors = self._play(values, start, controls, steps)
         if self._model.nsensordata:
             rows = np.concatenate([start[:, None], states[:, :-1]], axis=1)
             return np.asarray(np.concatenate([rows, sensors], axis=2)[:, :, 1 + columns])
         return np.concatenate([start[:, None, 1 + columns], states[:, :, 1 + columns]], axis=1)
+
+    def _steps(self, duration: float) -> int:
+        steps = max(int(np.ceil(duration / self.time_step)), 1)
+        return steps + bool(self._model.nsensordata)  # sensors speak of the state before a step
+
+    def _begin(self, values: Floats, inputs: Floats, steps: int) -> tuple[Floats, Floats | None]:
+        """(B, s) states at simulated time 0 and (B, T, nu) controls."""
+        start = np.zeros((len(values), mujoco.mj_stateSize(self._model, _STATE)))
+        nq, nv = self._model.nq, self._model.nv
+        start[:, 1 : 1 + nq], start[:, 1 + nq : 1 + nq + nv] = self._dynamics.start(self._of_cell(values), inputs)
+        return start, self._controls(values, inputs, steps) if self._model.nu else None
+
+    def _play(self, values: Floats, start: Floats, controls: Floats | None, steps: int) -> tuple[Floats, Floats]:
+        """(B, T, s) states and (B, T, nsensordata) sensors from (B, s) states on."""
+        batch = len(values)
+        while len(self._models) < batch:
+            self._models.append(copy.copy(self._model))
+        models = self._models[:batch]
+        self._write(models, values)
+        with Programs(models, self._terms(values)):
+            states, sensors = self._pool.rollout(models, self._data, start, controls, nstep=steps)
+        self._spent.rollouts += batch
+        self._spent.seconds += batch * steps * self.time_step
+        return states, sensors
 
     def _controls(self, values: Floats, inputs: Floats, steps: int) -> Floats:
         controls = self._dynamics.controls(self._of_cell(values), inputs, steps)
