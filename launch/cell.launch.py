@@ -16,6 +16,7 @@ from launch_ros.substitutions import FindPackageShare
 from launch import LaunchDescription
 
 NODES = ("puck_tracker", "recorder", "calibrator")
+PROMPT = ("puck_tracker", "recorder")
 CAMERA = {"image": "/camera/camera/color/image_raw", "camera_info": "/camera/camera/color/camera_info"}
 TABLE = {"x": "0", "y": "0", "z": "0", "yaw": "0", "pitch": "0", "roll": "0"}
 
@@ -25,6 +26,9 @@ def generate_launch_description() -> LaunchDescription:
     arguments = [
         DeclareLaunchArgument("namespace", default_value="", description="namespace of all nodes"),
         DeclareLaunchArgument("use_sim_time", default_value="false", description="take the time from /clock"),
+        DeclareLaunchArgument(
+            "prefix", default_value="", description="before the commands of tracker and recorder: 'chrt --fifo 20'"
+        ),
         DeclareLaunchArgument("world", default_value="world", description="frame in which the table stands"),
     ]
     arguments += [
@@ -54,6 +58,7 @@ def generate_launch_description() -> LaunchDescription:
                 {"use_sim_time": LaunchConfiguration("use_sim_time")},
             ],
             remappings=[(topic, LaunchConfiguration(topic)) for topic in CAMERA] if name == "puck_tracker" else [],
+            prefix=LaunchConfiguration("prefix") if name in PROMPT else None,
             output="screen",
         )
         for name in NODES

@@ -1,6 +1,6 @@
 """Half an hour of full load: images at 90 Hz, poses at 1 kHz, recording while calibrating; `make soak`.
 
-    python scripts/soak.py [--minutes 30] [--json docs/soak.json] [--page docs/reliability.md]
+    python scripts/soak.py [--minutes 30] [--prefix "chrt --fifo 20"] [--json soak.json] [--page docs/reliability.md]
 
 Measured are the memory of each node, lost messages, and the time from an image to its poses. The last result is kept as
 JSON and shown in the page. Status 1 where a promise is broken.
@@ -12,12 +12,13 @@ import argparse
 import json
 import os
 import platform
+import shlex
 import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -46,6 +47,7 @@ PATIENCE_S = 120.0
 """An answer that takes longer will not come [s]."""
 LATENCY_P99_MS, GROWTH_MIB_PER_HOUR = 20.0, 30.0
 ARM = "/arm/pose"
+PROMPT = ("puck_tracker", "recorder")
 TRACKED = [f"/puck_tracker/{name}/pose" for name in ("puck1", "puck2", "pusher")]
 BEGIN, END = "<!-- soak: written by scripts/soak.py -->\n", "<!-- /soak -->"
 
@@ -66,8 +68,8 @@ class Heard:
 
 
 @contextmanager
-def processes(folder: Path) -> Iterator[Mapping[str, subprocess.Popen[str]]]:
-    """All nodes, in a DDS domain of their own; ended by SIGINT."""
+def processes(folder: Path, prefix: Sequence[str]) -> Iterator[Mapping[str, subprocess.Popen[str]]]:
+    """All nodes, in a DDS domain of their own; ended by SIGINT. `prefix`: before tracker's and recorder's commands."""
     parameters: dict[str, dict[str, Any]] = {
         "puck_tracker": {},
         "recorder": {"directory": str(folder / "bags"), "topics": [*TRACKED, ARM], "depth": 5000},
@@ -82,8 +84,9 @@ def processes(folder: Path) -> Iterator[Mapping[str, subprocess.Popen[str]]]:
 
     def start(name: str, *words: str) -> None:
         log = (folder / f"{name}.log").open("w")
+        before = prefix if name in PROMPT else ()
         running[name] = subprocess.Popen(
-            [sys.executable, *words], stdout=subprocess.PIPE, stderr=log, text=True, start_new_session=True
+            [*before, sys.executable, *words], stdout=subprocess.PIPE, stderr=log, text=True, start_new_session=True
         )
 
     for name, own in parameters.items():
@@ -172,12 +175,12 @@ def recorded(bags: list[Path]) -> tuple[int, int]:
     return found, holes
 
 
-def soak(minutes: float, folder: Path) -> dict[str, Any]:
+def soak(minutes: float, folder: Path, prefix: Sequence[str] = ()) -> dict[str, Any]:
     """Run the load; what was measured."""
     heard = Heard()
     rclpy.init()
     watcher = Watcher(heard)
-    with processes(folder) as running:
+    with processes(folder, prefix) as running:
         watcher.episode(WARM_UP_S, lambda: None)
         heard.bags.clear()
         heard.said.clear()
@@ -205,6 +208,7 @@ def soak(minutes: float, folder: Path) -> dict[str, Any]:
         "cores": len(os.sched_getaffinity(0)),
         "load_average": round(os.getloadavg()[1], 1),
         "machine": platform.machine(),
+        "prefix": " ".join(prefix),
         "images_sent_with_warm_up": sent["camera"],
         "images_tracked": len(latency),
         "images_missed": heard.missed_images,
@@ -230,6 +234,7 @@ def table(result: Mapping[str, Any]) -> str:
     )
     rows = {
         "time": f"{result['minutes']} minutes on {result['cores']} cores, load average {result['load_average']}",
+        "tracker and recorder started by": f"`{result['prefix']}`" if result["prefix"] else "nothing special",
         "image to poses": ", ".join(f"{name} {ms} ms" for name, ms in result["latency_ms"].items()),
         "images": f"{result['images_tracked']} tracked, {result['images_missed']} missed",
         "poses at 1 kHz": f"{result['arm_poses_recorded']} recorded, {result['arm_poses_lost']} lost",
@@ -256,6 +261,7 @@ def broken(result: Mapping[str, Any]) -> list[str]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--minutes", type=float, default=30.0)
+    parser.add_argument("--prefix", default="", help="before the commands of tracker and recorder: 'chrt --fifo 20'")
     parser.add_argument("--json", type=Path, default=ROOT / "docs" / "soak.json")
     parser.add_argument("--page", type=Path, default=ROOT / "docs" / "reliability.md")
     options = parser.parse_args()
@@ -265,7 +271,7 @@ def main() -> int:
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
             "FASTRTPS_DEFAULT_PROFILES_FILE": str(ROOT / "config" / "fastdds.xml"),
         }
-        result = soak(options.minutes, Path(folder))
+        result = soak(options.minutes, Path(folder), shlex.split(options.prefix))
     options.json.write_text(json.dumps(result, indent=1) + "\n")
     if options.page.exists():
         replace_between(options.page, BEGIN, END, table(result) + "\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -45,7 +46,8 @@ def commands(name: str, given: Mapping[str, str], monkeypatch: pytest.MonkeyPatc
     arguments |= given
     lines = {}
     for node in (e.words for e in entities if e.kind == "Node" and e.words["package"] == "compass_ros"):
-        words = [sys.executable, "-m", f"compass_ros.nodes.{node['executable']}", "--ros-args"]
+        words = shlex.split(resolved(node.get("prefix") or "", arguments))
+        words += [sys.executable, "-m", f"compass_ros.nodes.{node['executable']}", "--ros-args"]
         words += ["-r", f"__node:={node['name']}", "-r", f"__ns:=/{resolved(node['namespace'], arguments)}"]
         for parameters in node["parameters"]:
             if isinstance(parameters, dict):
@@ -119,12 +121,14 @@ def test_the_virtual_cell_in_a_namespace(probe: Probe, monkeypatch: pytest.Monke
 def test_the_real_cell_hears_the_camera_and_follows_the_simulated_clock(
     probe: Probe, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    lines = commands("cell", {"use_sim_time": "true"}, monkeypatch)
+    lines = commands("cell", {"use_sim_time": "true", "prefix": "nice -n 1"}, monkeypatch)
     assert set(lines) == {"puck_tracker", "recorder", "calibrator"}
-    with started(lines, tmp_path):
+    with started(lines, tmp_path) as running:
         for topic in ("image_raw", "camera_info"):
             camera = f"/camera/camera/color/{topic}"
             until(lambda t=camera: probe.node.count_subscribers(t) == 1, 30, f"a subscriber of {camera}")  # type: ignore[misc]
+        niceness = {name: os.getpriority(os.PRIO_PROCESS, process.pid) for name, process in running.items()}
+        assert niceness["puck_tracker"] == niceness["recorder"] == niceness["calibrator"] + 1
         diagnostics = probe.listen(DiagnosticArray, "/diagnostics")
         tick = probe.publisher(Clock, "/clock", RELIABLE)
         begun = time.monotonic()
