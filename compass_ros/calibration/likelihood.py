@@ -46,7 +46,7 @@ class Likelihood:
     prior_std: Floats
     """(P,)"""
     predict_alike: PredictAlike | None = None
-    """None: `predict`, and nothing is known of what rows have in common."""
+    """The same model as `predict`: who replaces one replaces both. None: nothing is known of what rows share."""
 
     @property
     def low(self) -> Floats:

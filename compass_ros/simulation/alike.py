@@ -32,24 +32,30 @@ def roll_alike(
     """
     models = np.unique(like)
     states = np.concatenate([start[models, None], play(models, start[models], 0)], axis=1)
+    same = np.full(len(start), steps)
     out = np.empty((len(start), steps + 1, len(columns)))
     out[models] = states[:, :, columns]
-    same = np.full(len(start), steps)
+
+    def branch_off(rows: Ints, step: int) -> Ints:
+        """Roll out from that step on. Returns the rows that had begun to differ before."""
+        of = np.searchsorted(models, like[rows])
+        begin = states[of, step] if step else start[rows]
+        after = play(rows, begin, step)
+        out[rows, :step] = states[of, :step][:, :, columns]
+        out[rows, step] = begin[:, columns]
+        out[rows, step + 1 :] = after[:, :, columns]
+        equal = (after[:, STRIDE - 1 :: STRIDE] == states[of, step + STRIDE :: STRIDE]).all(axis=2)
+        until_then = step + STRIDE * np.logical_and.accumulate(equal, axis=1).sum(axis=1)
+        same[rows] = np.where(equal.all(axis=1), steps, until_then)
+        return rows[same[rows] == step] if step else rows[:0]
+
     others = np.setdiff1d(np.arange(len(start)), models)
     begin = np.minimum(until[others], steps - 1) // GRID * GRID
-    todo = [(others[begin == step], int(step)) for step in np.unique(begin)]
-    while todo:
-        rows, step = todo.pop()
-        rows, rest = rows[:most], rows[most:]
-        if len(rest):
-            todo.append((rest, step))
-        known = states[np.searchsorted(models, like[rows])]
-        known[:, 0] = start[rows]
-        after = play(rows, known[:, step], step)
-        out[rows] = np.concatenate([known[:, : step + 1, columns], after[:, :, columns]], axis=1)
-        differs = (after[:, STRIDE - 1 :: STRIDE] != known[:, step + STRIDE :: STRIDE]).any(axis=2)
-        ever = differs.any(axis=1)
-        same[rows] = np.where(ever, step + STRIDE * differs.argmax(axis=1), steps) if differs.size else steps
-        if step and (early := rows[ever & (same[rows] == step)]).size:
-            todo.append((early, 0))
+    late = [branch_off(rows, int(step)) for step in np.unique(begin) for rows in _parts(others[begin == step], most)]
+    for rows in _parts(np.concatenate([others[:0], *late]), most):
+        branch_off(rows, 0)
     return out, same
+
+
+def _parts(rows: Ints, most: int) -> list[Ints]:
+    return [rows[i : i + most] for i in range(0, len(rows), most)]
