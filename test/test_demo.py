@@ -17,7 +17,7 @@ from compass_ros.cells import load
 from compass_ros.concealed.seal import unseal
 from compass_ros.episodes import find_bags, read_episodes
 from test.episodes.planted import PUCKS
-from test.nodes.harness import SHARED_MEMORY, held_locks, locks_in_use, until
+from test.nodes.harness import PATIENCE_S, SHARED_MEMORY, held_locks, locks_in_use, until
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
@@ -75,14 +75,14 @@ def started(tmp_path: Path) -> Iterator[list[Demo]]:
     for demo in demos:
         if demo.process.poll() is None:
             os.killpg(demo.process.pid, signal.SIGINT)
-            demo.process.wait(30)
+            demo.process.wait(PATIENCE_S)
         print(demo.log.read_text())
 
 
 def test_the_main_job(tmp_path: Path, started: list[Demo]) -> None:
     demo = Demo(tmp_path, "--shots", "6", "--effect", "none")
     started.append(demo)
-    until(demo.look, 400, "the end of the demonstration")
+    until(demo.look, "the end of the demonstration", timeout_s=1800)
     said = demo.log.read_text()
     assert demo.process.returncode == 0, said
     assert demo.nodes >= 6
@@ -110,11 +110,11 @@ def test_the_main_job(tmp_path: Path, started: list[Demo]) -> None:
 def test_what_is_stopped_leaves_nothing_running(by: signal.Signals, tmp_path: Path, started: list[Demo]) -> None:
     demo = Demo(tmp_path)
     started.append(demo)
-    until(lambda: demo.look() or len(list((demo.out / "bags").glob("*"))) > 1, 90, "the first episode")
+    until(lambda: demo.look() or len(list((demo.out / "bags").glob("*"))) > 1, "the first episode")
     demo.look()
     assert demo.nodes == 4
     demo.process.send_signal(by)
-    assert demo.process.wait(20) == 130
+    assert demo.process.wait(PATIENCE_S) == 130
     assert demo.left() == []
     assert "Traceback" not in demo.log.read_text()
     assert find_bags([demo.out / "bags"]), "what was recorded is still there"

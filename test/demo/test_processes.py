@@ -41,7 +41,7 @@ def test_a_client_without_a_calibrator_says_so(tmp_path: Path) -> None:
 def test_nothing_is_left_of_a_group_not_even_of_a_node_that_does_not_end(tmp_path: Path) -> None:
     with NodeGroup(tmp_path, patience_s=1.0) as nodes:
         node = nodes.start("recorder", directory=str(tmp_path / "bags"))
-        until(lambda: len(held_locks(node.process.pid)) > 1, 20, "the node's shared memory")
+        until(lambda: len(held_locks(node.process.pid)) > 1, "the node's shared memory")
         locks = held_locks(node.process.pid)
         os.kill(node.process.pid, 19)  # SIGSTOP: it cannot end by itself
         begin = time.monotonic()

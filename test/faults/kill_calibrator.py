@@ -24,7 +24,6 @@ from test.nodes.harness import LATCHED, NodeProcess, Probe, until
 from test.nodes.recordings import record
 
 STATUS = "/calibrator/status"
-PATIENCE_S = 300.0
 LONGEST_S = 8.0
 CUT_OFF = "was cut off"
 
@@ -61,7 +60,7 @@ def calibrated(folder: Path, settings: dict[str, object], domain: int) -> NodePr
     node = NodeProcess("calibrator", folder, settings, ())
     probe = Probe(domain)
     try:
-        probe.wait_for(probe.listen(CalibrationStatus, STATUS, LATCHED), succeeded, PATIENCE_S)
+        probe.wait_for(probe.listen(CalibrationStatus, STATUS, LATCHED), succeeded)
     finally:
         probe.close()
     return node
@@ -73,7 +72,7 @@ def once(folder: Path, settings: dict[str, object], domain: int, alive_s: float,
     node = NodeProcess("calibrator", folder, settings, ())
     probe = Probe(domain)
     try:
-        probe.wait_for(probe.listen(CalibrationStatus, STATUS, LATCHED), running, PATIENCE_S)
+        probe.wait_for(probe.listen(CalibrationStatus, STATUS, LATCHED), running)
         time.sleep(alive_s)
         node.process.kill()  # the node alone: its calibration lives in a session of its own
         node.process.wait()
@@ -84,12 +83,12 @@ def once(folder: Path, settings: dict[str, object], domain: int, alive_s: float,
     node, probe = NodeProcess("calibrator", folder, settings | {"bags": "", "resume": finish}, ()), Probe(domain)
     try:
         heard = probe.listen(CalibrationStatus, STATUS, LATCHED)
-        until(lambda: CUT_OFF in node.output(), PATIENCE_S, "a line in the log")
+        until(lambda: CUT_OFF in node.output(), "a line in the log")
         line = next(line for line in node.output().splitlines() if CUT_OFF in line)
         assert line.endswith("it begins anew" if finish else "it is not resumed"), line
-        until(lambda: not set(left) & set(orphans(output.parent)), 10, f"the end of the orphans {left}")
+        until(lambda: not set(left) & set(orphans(output.parent)), f"the end of the orphans {left}")
         if finish:
-            probe.wait_for(heard, succeeded, PATIENCE_S)
+            probe.wait_for(heard, succeeded)
         else:
             probe.wait_for(heard, lambda status: CUT_OFF in status.message)
         names = sorted(path.name for path in output.parent.iterdir())

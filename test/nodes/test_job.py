@@ -34,7 +34,7 @@ WRITE = "result.mkdir(); (result / 'result.json').write_text(sys.argv[0]);"
 
 def test_success_takes_the_name_of_the_output_and_leaves_nothing_else(tmp_path: Path) -> None:
     job = run(tmp_path, f"say(); say(done=1.0); {WRITE}")
-    assert job.finished.wait(10)
+    assert job.finished.wait(60)
     assert (job.outcome, job.message) == (Outcome.SUCCEEDED, f"result in {tmp_path / 'out'}")
     assert [step.progress.done for step in job.steps()] == [0.25, 1.0]
     assert job.steps() == []
@@ -45,7 +45,7 @@ def test_an_earlier_result_is_replaced_whole(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     for name in ("result.json", "old.html"):
         (tmp_path / "out" / name).write_text("old")
-    assert run(tmp_path, WRITE).finished.wait(10)
+    assert run(tmp_path, WRITE).finished.wait(60)
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["result.json"]
     assert (tmp_path / "out" / "result.json").read_text() == "-c"
 
@@ -58,15 +58,15 @@ def test_an_earlier_result_is_replaced_whole(tmp_path: Path) -> None:
         ("1 / 0", "ZeroDivisionError: division by zero"),
         ("sys.exit(2)", "the calibration process ended with status 2: it said nothing"),
         ("import os; os.kill(os.getpid(), 9)", "the calibration process ended with status -9: it said nothing"),
-        ("print('hello'); sys.stdout.flush(); time.sleep(60)", "expected progress as JSON, found b'hello\\n'"),
-        ("print('{}'); sys.stdout.flush(); time.sleep(60)", "expected progress as JSON, found b'{}\\n'"),
+        ("print('hello'); sys.stdout.flush(); time.sleep(600)", "expected progress as JSON, found b'hello\\n'"),
+        ("print('{}'); sys.stdout.flush(); time.sleep(600)", "expected progress as JSON, found b'{}\\n'"),
     ],
 )
 def test_failure_is_one_line_and_keeps_the_earlier_result(tmp_path: Path, script: str, message: str) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "result.json").write_text("old")
     job = run(tmp_path, WRITE + script)
-    assert job.finished.wait(10)
+    assert job.finished.wait(60)
     assert job.outcome is Outcome.FAILED
     assert message in job.message
     assert "\n" not in job.message
@@ -79,29 +79,27 @@ def test_cancel_ends_a_deaf_process_and_its_children_and_leaves_nothing(tmp_path
     job = run(
         tmp_path,
         "import signal, subprocess; signal.signal(signal.SIGTERM, signal.SIG_IGN);"
-        "child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(60)']);"
-        f"{WRITE} say(iteration=child.pid); time.sleep(60)",
+        "child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)']);"
+        f"{WRITE} say(iteration=child.pid); time.sleep(600)",
     )
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 300
     while not (steps := job.steps()):
         assert time.monotonic() < deadline
         time.sleep(0.01)
     child = Path("/proc", str(steps[0].progress.iteration))
     assert child.exists()
-    begin = time.monotonic()
     job.cancel()
-    assert job.finished.wait(1)
-    assert time.monotonic() - begin < 1
+    assert job.finished.wait(300), "before the deaf process would have ended by itself"
     assert (job.outcome, job.message) == (Outcome.CANCELLED, "cancelled; nothing was written")
     assert list(tmp_path.iterdir()) == []
     while child.exists() and "\nState:\tZ" not in (child / "status").read_text():
-        assert time.monotonic() < begin + 5
+        assert time.monotonic() < deadline
         time.sleep(0.01)
 
 
 def test_cancel_after_the_end_changes_nothing(tmp_path: Path) -> None:
     job = run(tmp_path, WRITE)
-    assert job.finished.wait(10)
+    assert job.finished.wait(60)
     job.cancel()
     assert job.outcome is Outcome.SUCCEEDED
     assert (tmp_path / "out" / "result.json").exists()

@@ -19,7 +19,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from lifecycle_msgs.srv import GetState
 from rosgraph_msgs.msg import Clock
 
-from test.nodes.harness import RELIABLE, SENSOR, SHARED_MEMORY, Probe, until
+from test.nodes.harness import PATIENCE_S, RELIABLE, SENSOR, SHARED_MEMORY, Probe, until
 from test.test_launch import Noted, description
 
 pytestmark = pytest.mark.ros
@@ -73,7 +73,7 @@ def started(lines: Mapping[str, list[str]], folder: Path) -> Iterator[dict[str, 
         own = {path for path in set(SHARED_MEMORY.iterdir()) - before if "fastrtps_port" not in path.name}
         for process in running.values():
             process.send_signal(signal.SIGINT)
-        statuses = {name: process.wait(15) for name, process in running.items()}
+        statuses = {name: process.wait(PATIENCE_S) for name, process in running.items()}
         assert statuses == dict.fromkeys(lines, 0)
         mine = [path for path in own if path.exists() and not held_elsewhere(path)]
         assert mine == [], "shared memory that nobody holds"
@@ -98,7 +98,7 @@ def held_elsewhere(path: Path) -> bool:
 
 
 def active(probe: Probe, name: str) -> bool:
-    return str(probe.call(GetState, f"{name}/get_state", timeout_s=20).current_state.label) == "active"
+    return str(probe.call(GetState, f"{name}/get_state").current_state.label) == "active"
 
 
 def test_the_virtual_cell_in_a_namespace(probe: Probe, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -111,9 +111,9 @@ def test_the_virtual_cell_in_a_namespace(probe: Probe, monkeypatch: pytest.Monke
             nodes = probe.node.get_node_names_and_namespaces()
             return {f"{space.rstrip('/')}/{name}" for name, space in nodes} & names
 
-        until(lambda: found() == names, 30, "all nodes in their namespace")
+        until(lambda: found() == names, "all nodes in their namespace")
         heard = probe.listen(PoseWithCovarianceStamped, "/cell1/puck_tracker/puck1/pose", SENSOR)
-        probe.wait_for(heard, timeout_s=30)
+        probe.wait_for(heard)
         assert all(active(probe, f"/cell1/{name}") for name in lines if name != "virtual_cell")
         assert (tmp_path / "out" / "episodes").is_dir(), "the recorder's own parameter file is read"
 
@@ -126,7 +126,7 @@ def test_the_real_cell_hears_the_camera_and_follows_the_simulated_clock(
     with started(lines, tmp_path) as running:
         for topic in ("image_raw", "camera_info"):
             camera = f"/camera/camera/color/{topic}"
-            until(lambda t=camera: probe.node.count_subscribers(t) == 1, 30, f"a subscriber of {camera}")  # type: ignore[misc]
+            until(lambda t=camera: probe.node.count_subscribers(t) == 1, f"a subscriber of {camera}")  # type: ignore[misc]
         niceness = {name: os.getpriority(os.PRIO_PROCESS, process.pid) for name, process in running.items()}
         assert niceness["puck_tracker"] == niceness["recorder"] == niceness["calibrator"] + 1
         diagnostics = probe.listen(DiagnosticArray, "/diagnostics")
@@ -140,5 +140,5 @@ def test_the_real_cell_hears_the_camera_and_follows_the_simulated_clock(
             return any(d.header.stamp.sec >= 1000 and name in d.status[0].name for d in diagnostics)
 
         for name in lines:
-            until(lambda n=name: heard_of(n), 20, f"diagnostics of {name} in simulated time")  # type: ignore[misc]
+            until(lambda n=name: heard_of(n), f"diagnostics of {name} in simulated time")  # type: ignore[misc]
         assert max(d.header.stamp.sec for d in diagnostics) < 10_000, "nobody uses the wall's clock"

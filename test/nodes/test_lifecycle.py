@@ -25,11 +25,11 @@ OWN_SERVICE = {"puck_tracker": "accept_table", "recorder": "discard_episode", "c
 
 def change(probe: Probe, node: str, transition: int = 0, label: str = "") -> bool:
     request = ChangeState.Request(transition=Transition(id=transition, label=label))
-    return bool(probe.call(ChangeState, f"/{node}/change_state", request, timeout_s=30).success)
+    return bool(probe.call(ChangeState, f"/{node}/change_state", request).success)
 
 
 def state(probe: Probe, node: str) -> str:
-    return str(probe.call(GetState, f"/{node}/get_state", timeout_s=30).current_state.label)
+    return str(probe.call(GetState, f"/{node}/get_state").current_state.label)
 
 
 def services(probe: Probe, node: str) -> set[str]:

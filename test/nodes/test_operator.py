@@ -78,10 +78,10 @@ def test_proposed_applied_checked_and_taken_back(
     say = probe.publisher(EpisodeInfo, "/recorder/status", RELIABLE)
     for bag in before[4:]:
         say(EpisodeInfo(state=EpisodeInfo.FINISHED, cell="air_hockey", bag=str(bag)))
-    probe.wait_for(diagnostics, lambda _: said(diagnostics, "no sign that the gap has grown in 6 episodes"), 20)
+    probe.wait_for(diagnostics, lambda _: said(diagnostics, "no sign that the gap has grown in 6 episodes"))
     for bag in after:
         say(EpisodeInfo(state=EpisodeInfo.FINISHED, cell="air_hockey", bag=str(bag)))
-    probe.wait_for(diagnostics, lambda _: said(diagnostics, "please recalibrate", DiagnosticStatus.WARN), 30)
+    probe.wait_for(diagnostics, lambda _: said(diagnostics, "please recalibrate", DiagnosticStatus.WARN))
     assert node.output().count("please recalibrate") == 1
     assert probe.wait_for(diagnostics).status[0].message == "idle", "it asks; it does not begin by itself"
 
@@ -97,13 +97,13 @@ def test_the_map_and_the_markers_come_to_those_who_look_later(
     output: Path, start_node: StartNode, probe: Probe, tmp_path: Path
 ) -> None:
     start_node("calibrator", output=str(output), versions=str(tmp_path / "versions"))
-    grid = probe.wait_for(probe.listen(OccupancyGrid, "/calibrator/mismatch_map", LATCHED), timeout_s=20)
+    grid = probe.wait_for(probe.listen(OccupancyGrid, "/calibrator/mismatch_map", LATCHED))
     assert grid.header.frame_id == "table"
     assert len(grid.data) == grid.info.width * grid.info.height
     known = [share for share in grid.data if share >= 0]
     assert known
     assert max(known) < 30, "the true parameters leave nothing but noise"
-    markers = probe.wait_for(probe.listen(MarkerArray, "/calibrator/markers", LATCHED), timeout_s=20).markers
+    markers = probe.wait_for(probe.listen(MarkerArray, "/calibrator/markers", LATCHED)).markers
     assert {m.ns for m in markers} >= {"puck1 recorded", "puck1 simulated", "puck2 recorded", "verdict"}
     assert all(len(m.points) > 50 for m in markers if m.ns.endswith("recorded"))
 
@@ -114,14 +114,14 @@ def test_bags_that_vanish_cost_the_map_and_not_the_node(
     (output / "origin.yaml").write_text(yaml.safe_dump({"bags": [str(tmp_path / "gone")]}))
     node = start_node("calibrator", output=str(output), versions=str(tmp_path / "versions"))
     diagnostics = probe.listen(DiagnosticArray, "/diagnostics")
-    probe.wait_for(diagnostics, lambda _: said(diagnostics, "none of the recordings", DiagnosticStatus.WARN), 20)
+    probe.wait_for(diagnostics, lambda _: said(diagnostics, "none of the recordings", DiagnosticStatus.WARN))
     assert probe.call(Trigger, "/calibrator/apply").success
     say = probe.publisher(EpisodeInfo, "/recorder/status", RELIABLE)
     lost = shutil.copytree(before[0], tmp_path / "lost")
     shutil.rmtree(lost)
     say(EpisodeInfo(state=EpisodeInfo.FINISHED, cell="air_hockey", bag=str(lost)))
     say(EpisodeInfo(state=EpisodeInfo.FINISHED, cell="air_hockey", bag=str(before[1])))
-    probe.wait_for(diagnostics, lambda _: said(diagnostics, "no sign that the gap has grown in 1 episodes"), 20)
+    probe.wait_for(diagnostics, lambda _: said(diagnostics, "no sign that the gap has grown in 1 episodes"))
     assert str(lost) in node.output()
     assert "Traceback" not in node.output()
 
@@ -153,7 +153,7 @@ def test_hostile_goals_are_refused_in_one_line(start_node: StartNode, probe: Pro
         (Calibrate.Goal(bags=["/b"], cell="$(touch /tmp/owned)"), "touch"),
         (Calibrate.Goal(bags=["/b"], seed=2**64 - 1), "/b"),
     ):
-        answer = probe.ask(probe.ask(action.send_goal_async, goal).get_result_async, timeout_s=30).result
+        answer = probe.ask(probe.ask(action.send_goal_async, goal).get_result_async).result
         assert not answer.success
         assert words in answer.message, answer.message
         assert "\n" not in answer.message

@@ -27,7 +27,7 @@ from compass_ros.nodes.images import (
 from compass_ros.tracking.scene_config import SceneConfig
 from compass_ros.tracking.virtual_camera import VirtualCamera, make_camera, render
 from test.nodes.conftest import StartNode
-from test.nodes.harness import NodeProcess, Probe, until
+from test.nodes.harness import PATIENCE_S, NodeProcess, Probe, until
 
 pytestmark = pytest.mark.ros
 SENSOR = QoSProfile(depth=30, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -75,7 +75,7 @@ def test_poses_have_the_stamp_of_their_image_and_say_when_they_are_predicted(pro
     heard = {name: probe.listen(PoseWithCovarianceStamped, f"/puck_tracker/{name}/pose", SENSOR) for name in PLACES}
     markers = probe.listen(MarkerArray, "/puck_tracker/markers")
     debug = probe.listen(Image, "/puck_tracker/debug_image", SENSOR)
-    until(lambda: bool(send()) and all(heard.values()), 15, "the first poses")
+    until(lambda: bool(send()) and all(heard.values()), "the first poses")
     stamp = send()
     for name, (x, y) in PLACES.items():
         pose = probe.wait_for(heard[name], lambda p: stamp_ns(p.header.stamp) == stamp)
@@ -88,7 +88,7 @@ def test_poses_have_the_stamp_of_their_image_and_say_when_they_are_predicted(pro
     pose = probe.wait_for(heard["puck2"], lambda p: stamp_ns(p.header.stamp) == hidden)
     assert np.sqrt(covariance_of(pose)[0, 0]) >= 0.01
     assert {m.ns for m in probe.wait_for(markers).markers} == set(PLACES)
-    until(lambda: bool(send()) and bool(debug), 10, "an annotated image")
+    until(lambda: bool(send()) and bool(debug), "an annotated image")
     assert debug[0].width == 640
 
 
@@ -101,7 +101,7 @@ def test_parameters_are_described_and_take_effect_while_it_runs(probe: Probe, se
     assert described[2].integer_range[0].from_value == 2
 
     heard = probe.listen(PoseWithCovarianceStamped, "/puck_tracker/puck2/pose", SENSOR)
-    until(lambda: bool(send()) and bool(heard), 15, "a pose")
+    until(lambda: bool(send()) and bool(heard), "a pose")
     assert set_double(probe, "objects.puck2.hue_deg", 60.0) == (True, "")
     stamp = send()
     pose = probe.wait_for(heard, lambda p: stamp_ns(p.header.stamp) == stamp)
@@ -122,12 +122,12 @@ def test_trouble_is_said_once_in_one_line_and_passes(
     def said(text: str) -> bool:
         return any(text in a.status[0].message and a.status[0].level == DiagnosticStatus.WARN for a in diagnostics)
 
-    until(lambda: bool(send(gray)) and said("no fiducials in view: 0 of the markers"), 15, "the problem")
-    until(lambda: bool(send()) and bool(heard), 15, "a pose after the trouble")
+    until(lambda: bool(send(gray)) and said("no fiducials in view: 0 of the markers"), "the problem")
+    until(lambda: bool(send()) and bool(heard), "a pose after the trouble")
     assert tracker.output().count("no fiducials in view") == 1
-    until(lambda: bool(send(gray[:240])) and "camera_info says 640x480" in tracker.output(), 10, "a size complaint")
+    until(lambda: bool(send(gray[:240])) and "camera_info says 640x480" in tracker.output(), "a size complaint")
     count = len(heard)
-    until(lambda: bool(send()) and len(heard) > count, 10, "a pose after a bad image")
+    until(lambda: bool(send()) and len(heard) > count, "a pose after a bad image")
     assert tracker.stop() == 0
     assert "Traceback" not in tracker.output()
 
@@ -140,28 +140,28 @@ def test_the_watchdog_says_each_alarm_once(
     def said(text: str) -> bool:
         return bool(diagnostics) and text in diagnostics[-1].status[0].message
 
-    until(lambda: "the camera has stopped: no images for" in tracker.output(), 5, "a camera that never spoke")
-    until(lambda: bool(send()) and said("tracking"), 15, "all is well")
+    until(lambda: "the camera has stopped: no images for" in tracker.output(), "a camera that never spoke")
+    until(lambda: bool(send()) and said("tracking"), "all is well")
     values = {pair.key: pair.value for pair in diagnostics[-1].status[0].values}
     assert float(values["share of images with puck1"]) > 0.9
     assert 0 < float(values["latency p50 [ms]"]) <= float(values["latency p99 [ms]"]) < 1000
-    until(lambda: tracker.output().count("over: the camera has stopped") == 1, 5, "the end of the first alarm")
-    until(lambda: said("the camera has stopped"), 5, "the camera's silence")
+    until(lambda: tracker.output().count("over: the camera has stopped") == 1, "the end of the first alarm")
+    until(lambda: said("the camera has stopped"), "the camera's silence")
     assert tracker.output().count("the camera has stopped: no images") == 2
 
     gone = {name: xy for name, xy in PLACES.items() if name != "puck1"}
-    until(lambda: bool(send(places=gone)) and said("puck1 is lost: not seen for"), 20, "the loss of a puck")
+    until(lambda: bool(send(places=gone)) and said("puck1 is lost: not seen for"), "the loss of a puck")
     picture = render(camera, {name: np.tile([*xy, 0.0], (5, 1)) for name, xy in PLACES.items()}, 1)
     pushed = np.roll(picture, 4, axis=1)  # the camera is turned by four pixels
-    until(lambda: bool(send(pushed)) and said("the table has moved by"), 20, "the push")
+    until(lambda: bool(send(pushed)) and said("the table has moved by"), "the push")
     assert "accepted: the table may stand" in probe.call(Trigger, "/puck_tracker/accept_table").message
-    until(lambda: bool(send(pushed)) and said("tracking"), 20, "the end of the alarm")
+    until(lambda: bool(send(pushed)) and said("tracking"), "the end of the alarm")
     assert tracker.output().count("the table has moved by") == 1
 
 
 def test_bad_parameters_at_the_start_end_it_with_one_line(start_node: StartNode) -> None:
     node = start_node("puck_tracker", **{"fiducials.ids": [1, 1, 2, 3]})
-    assert node.process.wait(15) == 1
+    assert node.process.wait(PATIENCE_S) == 1
     assert "puck_tracker: parameters of puck_tracker: fiducials: expected distinct ids" in node.output()
     assert "Traceback" not in node.output()
 

@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 
 from compass_ros.episodes import read_episode
 from test.episodes.planted import PUCK1, mcap_file
-from test.nodes.episodes import TOPIC, pose, timed
+from test.nodes.episodes import TOPIC, pose
 from test.nodes.harness import LATCHED, NodeProcess, Probe, until
 
 pytestmark = pytest.mark.ros
@@ -30,7 +30,7 @@ def test_an_episode_over_dds(recorder: NodeProcess, probe: Probe) -> None:
     reports = probe.listen(DiagnosticArray, "/diagnostics")
     publish(pose(0))  # before the episode
     request = StartEpisode.Request(cell="air_hockey", cell_hash="a1b2")
-    started = timed(probe, StartEpisode, "/recorder/start_episode", request)
+    started = probe.call(StartEpisode, "/recorder/start_episode", request)
     assert started.success, started.message
     shot = ShotCommand(cell="air_hockey", names=["x", "velocity"], values=[-0.2, 0.4])
     shot.header.stamp.sec = 1
@@ -39,10 +39,10 @@ def test_an_episode_over_dds(recorder: NodeProcess, probe: Probe) -> None:
     for message in sent:
         publish(message)
         time.sleep(0.002)
-    until(lambda: bool(statuses) and statuses[-1].messages == 302, 5, "302 messages")
-    refused = timed(probe, StartEpisode, "/recorder/start_episode")
+    until(lambda: bool(statuses) and statuses[-1].messages == 302, "302 messages")
+    refused = probe.call(StartEpisode, "/recorder/start_episode")
     assert (refused.success, "stop or discard it first" in refused.message) == (False, True)
-    stopped = timed(probe, StopEpisode, "/recorder/stop_episode")
+    stopped = probe.call(StopEpisode, "/recorder/stop_episode")
     assert (stopped.success, stopped.message) == (True, "")
     assert (stopped.info.state, stopped.info.messages) == (EpisodeInfo.FINISHED, 302)
     finished = probe.wait_for(statuses, lambda status: status.state == EpisodeInfo.FINISHED)
@@ -64,7 +64,7 @@ def test_an_episode_over_dds(recorder: NodeProcess, probe: Probe) -> None:
 
 def test_discard_and_names(recorder: NodeProcess, probe: Probe, tmp_path: Path) -> None:
     for name in ("../out", "/tmp/out", "..", "a/b"):
-        answer = timed(probe, StartEpisode, "/recorder/start_episode", StartEpisode.Request(episode=name))
+        answer = probe.call(StartEpisode, "/recorder/start_episode", StartEpisode.Request(episode=name))
         assert not answer.success
         assert "episode name" in answer.message
     for hostile, words in (
@@ -81,8 +81,8 @@ def test_discard_and_names(recorder: NodeProcess, probe: Probe, tmp_path: Path) 
         assert words in answer.message
         assert "\n" not in answer.message
         assert len(answer.message) < 300
-    assert timed(probe, StartEpisode, "/recorder/start_episode", StartEpisode.Request(episode="mine")).success
-    assert timed(probe, Trigger, "/recorder/discard_episode").message == "discarded mine"
-    assert not timed(probe, StopEpisode, "/recorder/stop_episode").success
+    assert probe.call(StartEpisode, "/recorder/start_episode", StartEpisode.Request(episode="mine")).success
+    assert probe.call(Trigger, "/recorder/discard_episode").message == "discarded mine"
+    assert not probe.call(StopEpisode, "/recorder/stop_episode").success
     assert [path.name for path in tmp_path.rglob("*") if path.is_dir()] == ["bags"]
     assert recorder.stop() == 0

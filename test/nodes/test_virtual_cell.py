@@ -22,7 +22,7 @@ from compass_ros.concealed.stage import Secret, Stage
 from compass_ros.nodes.images import stamp_ns
 from compass_ros.simulation import Simulator
 from test.nodes.conftest import StartNode
-from test.nodes.harness import Probe, until
+from test.nodes.harness import PATIENCE_S, Probe, until
 
 pytestmark = pytest.mark.ros
 IMAGES = QoSProfile(depth=60, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -67,7 +67,7 @@ def test_a_shot_is_filmed_tracked_and_revealed_only_on_request(
     shot = probe.wait_for(shots)
     start = stamp_ns(shot.header.stamp)
     assert dict(zip(shot.names, shot.values, strict=True)) == SHOT
-    until(lambda: bool(stamps) and stamps[-1] > start + 2_600_000_000, 15, "the end of the shot")
+    until(lambda: bool(stamps) and stamps[-1] > start + 2_600_000_000, "the end of the shot")
 
     gaps = np.diff([stamp for stamp in stamps if stamp > start - 400_000_000])
     assert np.abs(gaps - 1e9 / 60).max() <= 1, "an image was lost, or a stamp is not the sensor's"
@@ -134,7 +134,7 @@ def test_a_concealed_law_is_played_and_revealed(start_node: StartNode, probe: Pr
     probe.wait_for(heard)
     send(command())
     start = stamp_ns(probe.wait_for(shots).header.stamp)
-    until(lambda: stamp_ns(heard[-1].header.stamp) > start + 2_400_000_000, 15, "the end of the shot")
+    until(lambda: stamp_ns(heard[-1].header.stamp) > start + 2_400_000_000, "the end of the shot")
 
     seen = [p for p in heard if start + 1_000_000_000 <= stamp_ns(p.header.stamp) <= start + 2_400_000_000]
     time_s = np.array([(stamp_ns(p.header.stamp) - start) * 1e-9 for p in seen])
@@ -154,6 +154,6 @@ def test_a_wrong_hidden_parameter_ends_the_node_with_one_line(start_node: StartN
     file = tmp_path / "truth.yaml"
     file.write_text("puck1@dyna@dampin: -6\n")
     node = start_node("virtual_cell", hidden_parameters_file=str(file))
-    assert node.process.wait(15) == 1
+    assert node.process.wait(PATIENCE_S) == 1
     assert "did you mean 'puck1@dyna@damping'?" in node.output()
     assert "Traceback" not in node.output()
