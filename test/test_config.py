@@ -88,7 +88,7 @@ def test_a_hostile_yaml_is_refused_at_once_with_one_line(tmp_path: Path, kind: s
     before = time.process_time()
     with pytest.raises(ConfigError, match=r"hostile\.yaml: not valid YAML: ") as caught:
         read_yaml(path)
-    assert time.process_time() - before < 2
+    assert time.process_time() - before < 60, "expanded, it would not end"
     assert len(str(caught.value)) < 400 + len(str(path))
     assert "\n" not in str(caught.value)
 

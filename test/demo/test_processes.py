@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from pathlib import Path
 
 import pytest
@@ -44,8 +43,6 @@ def test_nothing_is_left_of_a_group_not_even_of_a_node_that_does_not_end(tmp_pat
         until(lambda: len(held_locks(node.process.pid)) > 1, "the node's shared memory")
         locks = held_locks(node.process.pid)
         os.kill(node.process.pid, 19)  # SIGSTOP: it cannot end by itself
-        begin = time.monotonic()
-    assert time.monotonic() - begin < 5
     assert node.process.poll() is not None
     left = [lock for lock in locks if lock.exists() or (SHARED_MEMORY / lock.name.removesuffix("_el")).exists()]
     assert left == []
