@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,23 +17,17 @@ from compass_ros.discovery.finding import Discovery, Finding, not_evaluated
 from compass_ros.discovery.followed import followed
 from compass_ros.discovery.information import information
 from compass_ros.discovery.maps import residual_map
-from compass_ros.discovery.null import Null, simulate_null
+from compass_ros.discovery.noticed import noticed
+from compass_ros.discovery.null import simulate_null
 from compass_ros.discovery.numerics import numerical_cause
 from compass_ros.discovery.plan import objections, plan_of
 from compass_ros.discovery.remainder import smooth_excess
-from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import screen
 from compass_ros.discovery.unseen import held_out
 from compass_ros.errors import DataError
 from compass_ros.simulation import Simulator
 from compass_ros.types import Mismatch, Progress, Report
 
-LEAST_GAIN = 10.0
-"""Log likelihood that an effect must gain, whatever the null says."""
-SOMETHING = 0.06
-"""Excess of chi-square (`smooth_excess`) from which something is there although no candidate stands out."""
-NOTICED = 0.25
-"""Least rms movement by what is missing, as a share of the cell's expected noise: less is the tracker's own error."""
 RESTARTED = 0.15
 """Share of the excess by which a plain fit from elsewhere must be better to be the new beginning."""
 POOR = 4.0
@@ -67,22 +60,22 @@ def discover(
     before = residual_map(space)
     tell("screen effects", 0.3)
     found = Finding(simulator, space, refined, judge, noise, null, undetectable, before, seed, warnings)
-    if not _something(space, scores, null, noise):
+    unseen = held_out(judge, space.likelihood, space.fit)
+    if not noticed(space, scores, null, noise, unseen):
         return found.none(scores)
     excess = smooth_excess(space.likelihood, space.fit.point, space.fit.robust)
     cause = numerical_cause(space, 0.5 * excess * space.likelihood.measurements)
     if cause:
         return found.failed(f"No verdict: {cause}. That is the simulator's numerics, not physics.")
     tell("fit effects", 0.4)
-    unseen = held_out(judge, space.likelihood, space.fit)
     choice = choose(space, scores, asked, unseen, from_the_beginning(simulator, *plain, asked), poor(refined))
     again = _restarted(*plain, choice, simulator)
     if again is not None:  # the plain simulator does better than it was thought to: begin again from there
         space, scores = screen(simulator, again.likelihood, again.fit, asked)
         found = replace(found, space=space, refined=again, null=simulate_null(space, scores, noise, seed))
-        if not _something(space, scores, found.null, noise):
-            return found.none(scores)
         unseen = held_out(judge, space.likelihood, space.fit)
+        if not noticed(space, scores, found.null, noise, unseen):
+            return found.none(scores)
         choice = choose(space, scores, asked, unseen)
     tell("weigh effects", 0.9)
     return found.judged(choice, unseen)
@@ -100,17 +93,6 @@ def _lacking(simulator: Simulator, episodes: int) -> str:
     if not simulator.movers():
         return "effects act on bodies that slide in the plane and on joints; none is tracked in this cell"
     return ""
-
-
-def _something(space: Space, scores: Sequence[Score], null: Null, noise: Noise) -> bool:
-    """Whether a candidate or the sum of residuals stands out from the noise, by an amount that matters."""
-    gain = scores[0].gain / noise.correlation_time if scores else 0.0
-    excess = smooth_excess(space.likelihood, space.fit.point, space.fit.robust)
-    gained = 2 * max(scores[0].gain if scores else 0.0, 0.0) / space.likelihood.measurements
-    moved = float(np.sqrt(max(excess, gained, 0.0)) * np.median(noise.sigma))
-    if moved < NOTICED * space.simulator.cell.spec.noise_m:
-        return False
-    return gain > max(LEAST_GAIN, 1.2 * null.largest) or excess > SOMETHING * noise.correlation_time
 
 
 def _restarted(likelihood: Likelihood, fit: Fit, choice: Choice, simulator: Simulator) -> Refined | None:
