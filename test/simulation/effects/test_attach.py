@@ -62,7 +62,7 @@ def test_a_plain_model_moves_as_the_simulator_does(name: str) -> None:
 
 
 def test_every_array_of_the_model_is_as_before() -> None:
-    model = copy.copy(simulator()._model)
+    model = copy.copy(simulator().physics.model)
     before = {n: getattr(model, n).copy() for n in dir(model) if isinstance(getattr(model, n), np.ndarray)}
     given = (
         exported("off_centre_mass", (0.002, 0.001), ("puck1",)).effects
@@ -139,7 +139,7 @@ def test_what_cannot_act_is_refused(given: Exported, says: str) -> None:
 
 
 def test_a_second_attachment_to_one_model_is_refused_and_the_first_goes_on() -> None:
-    model = copy.copy(simulator()._model)
+    model = copy.copy(simulator().physics.model)
     with attach(model, mujoco.MjData(model), exported("viscous_drag", (1.0,), ("puck1",))):
         place = model.geom_pos.copy()
         second = Exported(

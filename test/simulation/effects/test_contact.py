@@ -125,7 +125,7 @@ def test_a_soft_wall_is_entered_deeper() -> None:
 
 
 def test_one_wall_alone_changes() -> None:
-    model = copy.copy(simulator()._model)
+    model = copy.copy(simulator().physics.model)
     data = mujoco.MjData(model)
     with attach(model, data, exported("local_wall", (0.01, -0.5), ("obstacle",))):
         assert model.geom("obstacle").pos[0] == pytest.approx(0.1 - 0.01)  # its thinner side lies along x

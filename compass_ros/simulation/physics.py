@@ -1,0 +1,141 @@
+"""What a parameter vector means: the cell's values, then the quantities of each attached effect."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from compass_ros.cells import Cell
+from compass_ros.cells.dynamics import Dynamics
+from compass_ros.simulation.effects.attached import Attached
+from compass_ros.simulation.effects.effect import Context, Sample, restore
+from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.types import QUANTITY_SIZE, Floats, Parameter
+
+STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS.value
+
+
+@dataclass(frozen=True)
+class Physics:
+    """A cell with effects, asked for B rollouts at once: (B, P) values, (B, A) inputs.
+
+    Raises ConfigError where an effect acts on what the scene lacks.
+    """
+
+    cell: Cell
+    dynamics: Dynamics
+    effects: tuple[Attached, ...]
+
+    def __post_init__(self) -> None:
+        for attached in self.effects:
+            attached.check(self.model)
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The scene at its defaults. Not to be changed."""
+        return self.dynamics.model
+
+    @property
+    def time_step(self) -> float:
+        return float(self.model.opt.timestep)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return self.cell.parameters + tuple(p for attached in self.effects for p in attached.parameters())
+
+    def of_cell(self, values: Floats) -> Floats:
+        """The part of the values that the cell knows."""
+        return values[:, : len(self.cell.parameters)]
+
+    def of_effects(self, values: Floats) -> list[tuple[Attached, Floats]]:
+        """Each effect with its (B, q) part of the values."""
+        out, at = [], len(self.cell.parameters)
+        for attached in self.effects:
+            size = len(attached.effect.quantities)
+            out.append((attached, values[:, at : at + size]))
+            at += size
+        return out
+
+    def context(self, attached: Attached, values: Floats) -> Context:
+        """What the hooks of an effect are told."""
+        planes: list[tuple[int, int]] = []
+        positions: list[int] = []
+        column = 0
+        for spec in self.cell.objects:
+            size = QUANTITY_SIZE[spec.quantity]
+            positions.extend(range(column, column + min(size, 3)))
+            if spec.quantity != "joint":
+                planes.append((column, column + 1))
+            column += size
+        sliding = {s.body: s for s in self.dynamics.sliding(self.of_cell(values))}
+        return Context(attached.objects, sliding, tuple(planes), tuple(positions), self.time_step)
+
+    def write(self, models: Sequence[mujoco.MjModel], values: Floats) -> None:
+        """Parameters and effects into B models. What MuJoCo derives from them (mj_setConst) is the caller's."""
+        for model in models:
+            restore(model, self.model)
+        self.dynamics.apply(models, self.of_cell(values))
+        for attached, numbers in self.of_effects(values):
+            if attached.effect.model is not None:
+                context = self.context(attached, values)
+                for model, of_rollout in zip(models, numbers, strict=True):
+                    attached.effect.model(model, of_rollout, context)
+
+    def terms(self, values: Floats) -> list[Term]:
+        """Friction of the table and forces of the effects."""
+        terms = [
+            Term(Kind.TABLE_FRICTION, s.body, np.stack([s.friction, s.creep, s.load], axis=1))
+            for s in self.dynamics.sliding(self.of_cell(values))
+        ]
+        for attached, numbers in self.of_effects(values):
+            if attached.effect.forces is not None and attached.present(numbers):
+                terms.extend(attached.effect.forces(numbers, self.context(attached, values)))
+        return terms
+
+    def start(self, values: Floats, inputs: Floats) -> Floats:
+        """(B, s) states at simulated time 0."""
+        nq, nv = self.model.nq, self.model.nv
+        start = np.zeros((len(values), mujoco.mj_stateSize(self.model, STATE)))
+        start[:, 1 : 1 + nq], start[:, 1 + nq : 1 + nq + nv] = self.dynamics.start(self.of_cell(values), inputs)
+        return start
+
+    def controls(self, values: Floats, inputs: Floats, steps: int) -> Floats | None:
+        """(B, T, nu) controls as the arm follows them; None where nothing is actuated."""
+        if not self.model.nu:
+            return None
+        controls = self.dynamics.controls(self.of_cell(values), inputs, steps)
+        for attached, numbers in self.of_effects(values):
+            if attached.effect.controls is not None:
+                controls = attached.effect.controls(controls, numbers, self.context(attached, values))
+        return np.ascontiguousarray(controls)
+
+    def duration(self, values: Floats, inputs: Floats, time_s: Floats) -> float:
+        """How long to simulate for what the tracker is asked at (B, F) times [s]."""
+        last = float(np.nanmax(time_s))
+        effects = self.of_effects(values)
+        ahead = sum(a.effect.ahead(numbers, last) for a, numbers in effects if a.effect.ahead is not None)
+        return float(np.nanmax(self.cell.simulated_time(inputs, time_s))) + ahead
+
+    def sensed(self, values: Floats, inputs: Floats, time_s: Floats, positions: Floats) -> Floats:
+        """(B, F, C) what the tracker says of (B, T + 1, C) positions at (B, F) times [s]."""
+
+        def perfect(time: Floats) -> Floats:
+            return interpolate(positions, self.time_step, self.cell.simulated_time(inputs, time))
+
+        sample: Sample = perfect
+        for attached, numbers in self.of_effects(values):
+            if attached.effect.sensing is not None:
+                sample = attached.effect.sensing(sample, numbers, self.context(attached, values))
+        return np.asarray(sample(time_s))
+
+
+def interpolate(positions: Floats, time_step: float, time_s: Floats) -> Floats:
+    """(B, F, C) linear interpolation of (B, T, C) rows at (B, F) times; before the start and after the end it holds."""
+    at = np.clip(np.nan_to_num(time_s) / time_step, 0, positions.shape[1] - 1)
+    low = np.minimum(at.astype(int), positions.shape[1] - 2)
+    share = (at - low)[:, :, None]
+    rows = np.arange(len(positions))[:, None]
+    return np.asarray((1 - share) * positions[rows, low] + share * positions[rows, low + 1])

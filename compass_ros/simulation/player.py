@@ -1,0 +1,49 @@
+"""Rollouts on all cores: each has a model of its own and starts from a state that holds all there is."""
+
+from __future__ import annotations
+
+import copy
+import os
+
+import mujoco
+from mujoco.rollout import Rollout
+
+from compass_ros.simulation.native.program import Programs
+from compass_ros.simulation.physics import Physics
+from compass_ros.types import Floats
+
+
+class Player:
+    """Threads, models and data for rollouts of one scene, and what they have cost so far."""
+
+    def __init__(self, scene: mujoco.MjModel, threads: int = 0) -> None:
+        """`threads`: 0 takes all cores."""
+        self.threads = threads or len(os.sched_getaffinity(0))
+        self.rollouts = 0
+        self.simulated_seconds = 0.0
+        self._scene = scene
+        self._models = [copy.copy(scene)]
+        self._data = [mujoco.MjData(scene) for _ in range(self.threads)]
+        self._scratch = mujoco.MjData(scene)
+        self._pool = Rollout(nthread=self.threads)
+
+    def written(self, physics: Physics, values: Floats) -> list[mujoco.MjModel]:
+        """B models with (B, P) values in them; they are the player's own and hold until the next call."""
+        while len(self._models) < len(values):
+            self._models.append(copy.copy(self._scene))
+        models = self._models[: len(values)]
+        physics.write(models, values)
+        for model in models:
+            mujoco.mj_setConst(model, self._scratch)
+        return models
+
+    def play(
+        self, physics: Physics, values: Floats, start: Floats, controls: Floats | None, steps: int
+    ) -> tuple[Floats, Floats]:
+        """(B, T, s) states and (B, T, nsensordata) sensors after each of T steps from (B, s) states on."""
+        models = self.written(physics, values)
+        with Programs(models, physics.terms(values)):
+            states, sensors = self._pool.rollout(models, self._data, start, controls, nstep=steps)
+        self.rollouts += len(values)
+        self.simulated_seconds += len(values) * steps * physics.time_step
+        return states, sensors
