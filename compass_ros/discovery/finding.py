@@ -136,7 +136,7 @@ class Finding:
         if ambiguous:
             following = next_experiment(self.simulator, self.space.likelihood, rivals, self.seed).sentence
             lacks = "one of these: " + "; ".join(a.effect.sentence for j in rivals for a in j.added)
-        values = "; ".join(value_of(f) for f in findings)
+        values = "; ".join(value_of(f, a) for f, a in zip(findings, joint.added, strict=True))
         sentence = f"{place(where)}, the simulator lacks {lacks}; {values}; {self._errors(joint)}."
         verdict: Verdict = "ambiguous" if ambiguous else "named"
         mismatch = Mismatch(verdict, where, tuple(findings), self.undetectable, following, sentence)

@@ -51,11 +51,15 @@ def place(where: Where) -> str:
     return words
 
 
-def value_of(finding: EffectFinding) -> str:
-    """The effect and its first number: 'fan_field, strength 0.21 +- 0.01 m/s^2'."""
-    name, first = next(iter(finding.parameters.items()))
-    unit = "" if first.unit == "1" else f" {first.unit}"
-    return f"{finding.name}, {name} {first.value:.3g} +- {first.std:.1g}{unit}"
+def value_of(finding: EffectFinding, attached: Attached) -> str:
+    """The effect and its amplitudes: 'fan_field, strength 0.21 +- 0.01 m/s^2'."""
+    numbers = []
+    for quantity in attached.effect.quantities:
+        if quantity.amplitude:
+            found = finding.parameters[quantity.name]
+            unit = "" if found.unit == "1" else f" {found.unit}"
+            numbers.append(f"{quantity.name} {found.value:.3g} +- {found.std:.1g}{unit}")
+    return f"{finding.name}, {', '.join(numbers)}"
 
 
 def errors(before: float, after: float, floor: float, unit: Unit) -> str:
