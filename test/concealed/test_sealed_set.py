@@ -61,17 +61,12 @@ def test_a_blind_process_can_do_everything_else(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "suite",
-    [Suite("nothing", ("--kind", "none"), 1), Suite("tilt", ("--effect", "table_tilt", "--rms", "4e-3"), 2)],
-    ids=lambda suite: suite.name,
-)
-def test_a_sealed_world(suite: Suite) -> None:
-    """The seal holds, the calibrator never opened the answer, and where it gives a verdict, it is right."""
-    line: Any = run(suite, suite.first_seed, "default", threads=2)
+def test_a_sealed_world() -> None:
+    """The seal holds, the calibrator never opened the answer, and its verdict is right; nothing missing: test_demo."""
+    line: Any = run(Suite("tilt", ("--effect", "table_tilt", "--rms", "4e-3"), 2), 2, "default", threads=2)
     assert line["error"] is None, line["error"]
     marks = line["marks"]
-    assert marks["verdict"] == "not_evaluated" or marks["right"], marks
+    assert marks["right"], marks
     assert marks["held_out_m"]["calibrated"] < 0.4 * marks["held_out_m"]["nominal"]
 
 

@@ -109,9 +109,9 @@ def test_bags_deleted_while_they_are_read(sound: list[Episode], tmp_path: Path) 
 
     watcher = threading.Thread(target=watch)
     watcher.start()
-    assert opened.wait(60)
+    assert opened.wait(300)
     shutil.rmtree(bags / "copy59")
-    _, said = process.communicate(timeout=120)
+    _, said = process.communicate(timeout=600)
     watcher.join()
     assert process.returncode == 1, said
     assert "copy59" in said.splitlines()[-1]
