@@ -22,7 +22,7 @@ from compass_ros.discovery.tangents import changes, screen
 from compass_ros.discovery.trials import TRIED, different, further, sketched, worth
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Quantity
-from compass_ros.types import Floats
+from compass_ros.types import Floats, Ints
 
 BEGUN = 1.1
 """Mean squared residual at which a simulator has begun to fail."""
@@ -59,8 +59,12 @@ def from_the_beginning(
     space, scores = screen(simulator, failed.likelihood, failed.fit, asked)
     forces = [s for s in scores if s.candidate.by_force]
     others = sorted((s for s in scores if not s.candidate.by_force), key=lambda s: -max(s.gain, _gain(space, s)))
-    begun = sorted((_begun(simulator, beginning, s.candidate) for s in different(others)[:TRIED]), key=_left)
-    kinds = sketched(space, forces)[:TRIED], [_freed(joint, beginning) for joint in begun[:FEW]]
+    known, fit_of = failed.likelihood, beginning.followed
+    started = (
+        begun(simulator, known, fit_of.point, fit_of.free, failed.fit.robust, s.candidate)
+        for s in different(others)[:TRIED]
+    )
+    kinds = sketched(space, forces)[:TRIED], [_freed(joint, beginning) for joint in sorted(started, key=_left)[:FEW]]
     tried = [sorted((further(j, SLIGHT, 4) for j in promising), key=_left) for promising in kinds]
     for joint in sorted((j for kind in tried for j in different(kind)[:FEW]), key=worth):
         all_objects = next(c.attached for c in asked if c.name == joint.name)
@@ -93,16 +97,25 @@ def _gain(space: Space, score: Score) -> float:
     return 0.5 * float(left[:, 0] @ left[:, 0] - np.min(np.sum(left**2, axis=0)))
 
 
-def _begun(simulator: Simulator, beginning: Beginning, candidate: Candidate) -> Joint:
-    """A candidate of which first order says little (contacts, commands, sensors), fitted from where all was well."""
+def begun(
+    simulator: Simulator,
+    likelihood: Likelihood,
+    point: Point,
+    free: Ints,
+    robust: float,
+    candidate: Candidate,
+    sizes: Sequence[float] = SIZES,
+) -> Joint:
+    """A candidate of which first order says little (contacts, commands, sensors), fitted from where all was well.
+
+    It begins with nothing, and with the best of some sizes, in its scale. The simulator is without the candidate.
+    """
     added = (candidate.attached,)
-    wider, likelihood = widened(simulator, beginning.failed.likelihood, added)
-    point, free = beginning.followed.point, beginning.followed.free
+    wider, likelihood = widened(simulator, likelihood, added)
     effect = np.arange(len(point.values), len(likelihood.prior_mean))
-    robust = beginning.failed.fit.robust
     starts = [
         Point(np.concatenate([point.values, numbers]), point.launch, np.inf)
-        for numbers in _sizes(candidate.attached.effect.quantities)
+        for numbers in _sizes(candidate.attached.effect.quantities, sizes)
     ]
     best = int(np.argmin(cost(likelihood, starts, robust)[0]))
     everything = np.concatenate([free, effect])
@@ -113,7 +126,7 @@ def _begun(simulator: Simulator, beginning: Beginning, candidate: Candidate) -> 
     return Joint(wider, likelihood, fit, added)
 
 
-def _sizes(quantities: Sequence[Quantity]) -> list[Floats]:
+def _sizes(quantities: Sequence[Quantity], sizes: Sequence[float] = SIZES) -> list[Floats]:
     """(q,) settings to begin with: none, and each amplitude alone, small and large, or two of one unit all around.
 
     Some act beyond a limit only. What an offset does at an impact is of second order: its direction must be tried.
@@ -123,8 +136,8 @@ def _sizes(quantities: Sequence[Quantity]) -> list[Floats]:
     rays = [sign * axis for axis in axes for sign in (1.0, -1.0)]
     if len(axes) == 2 and len({q.unit for q in quantities if q.amplitude}) == 1:
         rays = [np.cos(angle) * axes[0] + np.sin(angle) * axes[1] for angle in np.arange(AROUND) * 2 * np.pi / AROUND]
-    sizes = [none + size * ray * scale for size in SIZES for ray in rays]
-    return [none, *(s for s in sizes if np.all((low <= s) & (s <= high)))]
+    numbers = [none + size * ray * scale for size in sizes for ray in rays]
+    return [none, *(n for n in numbers if np.all((low <= n) & (n <= high)))]
 
 
 def _freed(joint: Joint, beginning: Beginning) -> Joint:

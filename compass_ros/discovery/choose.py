@@ -14,6 +14,7 @@ from compass_ros.calibration.least_squares import (
     minimise,
 )
 from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.discovery.beginning import begun
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.joint import Joint, converge, from_second_start, widened
 from compass_ros.discovery.remainder import smooth_excess
@@ -58,6 +59,8 @@ LEADERS = 4
 """Best fits that are continued, and of which one may be named."""
 CLOSE = 4.0
 """How far behind the best pair a second one may be to be followed too, in steps that promise SLIGHT."""
+OF_CONTACTS, FOLLOWED = (0.06, 0.5), 2
+"""Sizes from which effects of contacts are followed beside another effect, in their scale; how many to the end."""
 SLIGHT = 0.005
 """Share of the excess that a further step of a fit must promise: models are compared by shares of it."""
 
@@ -113,7 +116,7 @@ class Choice:
         share = unseen.share(joint)
         predicts = share >= PREDICTS or (share >= FORM_SHARE and unseen.remainder(joint) < SMALL)
         clear = self.share(joint) > CLEAR and self._alone(joint)
-        return self.enough(joint) and unseen.helps(joint) and (predicts or clear)
+        return self.enough(joint) and unseen.helps(joint) and (predicts or clear) and not joint.stands_in
 
     def enough(self, joint: Joint) -> bool:
         """Whether a model explains what there is to explain."""
@@ -199,12 +202,20 @@ def _in_pairs(choice: Choice, space: Space, candidates: Sequence[Candidate], uns
         choice = choice.of(sorted([*alone, *choice.singles], key=worth))
         if choice.good(unseen):
             return _concluded(choice, candidates, unseen)
-        if not (choice.shown_by(pairs[0]).share(pairs[0]) > SURELY and unseen.helps(pairs[0])):
+        if not _surely(choice, pairs, unseen):
+            pairs += _with_contacts(different(choice.singles)[0], candidates, slight)
+        if not _surely(choice, pairs, unseen):
             pairs += _pairs(alone[1:], candidates, slight)
     pair = max(pairs, key=lambda p: evidence(p, unseen), default=None)
     if pair and pair.fit.point.cost < min(j.fit.point.cost for j in choice.singles):
         choice = choice.shown_by(pair)
     return replace(choice, pair=pair)
+
+
+def _surely(choice: Choice, pairs: Sequence[Joint], unseen: HeldOut) -> bool:
+    """Whether the best of some pairs leaves nothing to look for."""
+    best = min(pairs, key=worth)
+    return choice.shown_by(best).share(best) > SURELY and unseen.helps(best)
 
 
 def _concluded(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
@@ -310,3 +321,22 @@ def _pairs(firsts: Sequence[Joint], candidates: Sequence[Candidate], slight: flo
     best = sorted((further(j, slight, 5) for j in sorted(found, key=worth)[:3]), key=worth)
     close = [j for j in best[:2] if worth(j) - worth(best[0]) < max(OF_LIMIT, CLOSE * slight)]
     return sorted((converge(j, slight) for j in close), key=worth)
+
+
+def _with_contacts(first: Joint, candidates: Sequence[Candidate], slight: float) -> list[Joint]:
+    """A fit of one effect with each effect of contacts, the best first.
+
+    First order says little of those: dampings take a small one away, and have to give it back as it grows.
+    """
+    own = {a.effect.name for a in first.added}
+    of_contacts = [
+        c
+        for c in candidates
+        if c.attached.effect.channel == "contact" and c.attached.effect.on != "walls" and c.name not in own
+    ]
+    point, free, robust = first.fit.point, first.fit.free, first.fit.robust
+    joints = (
+        begun(first.simulator, first.likelihood, point, free, robust, c, OF_CONTACTS) for c in different(of_contacts)
+    )
+    followed = [further(j, slight, 8) for j in sorted(joints, key=worth)[:FOLLOWED]]
+    return [replace(converge(j, slight), added=(*first.added, *j.added)) for j in sorted(followed, key=worth)[:1]]

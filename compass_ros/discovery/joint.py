@@ -46,6 +46,14 @@ class Joint:
     def name(self) -> str:
         return "+".join(sorted(a.effect.name for a in self.added))
 
+    @property
+    def stands_in(self) -> bool:
+        """Whether a field is as narrow as its range allows: it stands for something that is no field."""
+        numbers = self.fit.point.values[len(self.simulator.cell.parameters) :]
+        quantities = [q for attached in self.simulator.effects for q in attached.effect.quantities]
+        lengths = [(n, q.low) for n, q in zip(numbers, quantities, strict=True) if q.unit == "m" and not q.amplitude]
+        return any(number <= low for number, low in lengths if low > 0)
+
     def log_evidence(self, correlation_time: float) -> float:
         """Laplace approximation in the prior's units, the data's part divided by the correlation time."""
         hessian, _ = normal_equations(self.likelihood, self.fit.point, self.fit.linear, self.fit.free, self.fit.robust)

@@ -9,11 +9,12 @@ from typing import TypeVar
 import numpy as np
 
 from compass_ros.calibration.least_squares import minimise
+from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.joint import Joint, fit_jointly, from_first_guess
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.types import Bools
 
-Named = TypeVar("Named", Joint, Score)
+Named = TypeVar("Named", Candidate, Joint, Score)
 
 SKETCHED = 2
 """Steps of a sketch."""

@@ -63,10 +63,10 @@ def test_a_stopped_run_goes_on_where_it_was(tmp_path: Path) -> None:
     path, first, second = tmp_path / "proof" / "results.jsonl", Runner(stop_after=2), Runner()
     with pytest.raises(KeyboardInterrupt):
         prove(PLAN, path, 1, quiet, first)
-    assert sorted(key.seed for key in lines.read(path)) == first.seeds == [80000, 80001]
+    assert sorted(key.seed for key in lines.read(path)) == first.seeds == [90000, 90001]
     prove(PLAN, path, 1, quiet, second)
-    assert second.seeds == [80002]
-    assert [json.loads(line)["seed"] for line in path.read_text().splitlines()] == [80000, 80001, 80002]
+    assert second.seeds == [90002]
+    assert [json.loads(line)["seed"] for line in path.read_text().splitlines()] == [90000, 90001, 90002]
 
 
 @pytest.mark.parametrize("what", ["METHOD", "WORLDS"])
@@ -77,7 +77,7 @@ def test_worlds_of_an_older_method_are_run_again(tmp_path: Path, monkeypatch: py
     assert done.seeds == []
     monkeypatch.setattr(lines, what, ("errors.py",))
     prove(PLAN, path, 1, quiet, again)
-    assert again.seeds == [80000, 80001, 80002]
+    assert again.seeds == [90000, 90001, 90002]
     assert len(lines.read(path)) == 3
 
 
@@ -88,7 +88,7 @@ def test_a_run_that_failed_is_kept_counted_and_tried_again(tmp_path: Path) -> No
     (line,) = lines.read(path).values()
     assert table([line])[0].count == "0 of 1"
     prove(Plan(("main",), 1), path, 1, quiet, again)
-    assert again.seeds == [80000]
+    assert again.seeds == [90000]
 
 
 def test_a_line_says_what_made_it(tmp_path: Path) -> None:

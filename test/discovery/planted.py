@@ -37,8 +37,15 @@ FREE = (
 
 def recorded(effect: Attached | None, numbers: Sequence[float], shots: Floats = CALM, seed: int = 0) -> Likelihood:
     """Shots on a table with an effect, with noise."""
+    return recorded_with([effect] if effect else [], numbers, shots, seed)
+
+
+def recorded_with(
+    effects: Sequence[Attached], numbers: Sequence[float], shots: Floats = CALM, seed: int = 0
+) -> Likelihood:
+    """The same with several; `numbers` are those of all in their order."""
     clean = perfect(simulator(), shots, RATE, SIGMA)
-    wider = simulator().with_effects([effect] if effect else [])
+    wider = simulator().with_effects(effects)
     values = np.tile(np.concatenate([simulator().defaults, numbers]), (len(shots), 1))
     measured = wider.observe(values, shots, clean.time_s)
     return replace(clean, measured=measured + np.random.default_rng(seed).normal(0, SIGMA, measured.shape))

@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.choose import _one_of
+from compass_ros.calibration.refine import refine
+from compass_ros.discovery.beginning import begun
+from compass_ros.discovery.candidates import Candidate, candidates
+from compass_ros.discovery.choose import _one_of, _with_contacts
 from compass_ros.discovery.joint import fit_jointly
 from compass_ros.discovery.screen import Score
 from compass_ros.simulation.effects import EFFECTS, Attached
-from test.discovery.planted import PUCKS, recorded, space_of
+from test.discovery.planted import CALM, HELD_OUT, PUCKS, joint, planned_space, recorded, recorded_with, space_of
+from test.simulation.table import simulator
 
 SWIRL = Attached(EFFECTS["swirl"], PUCKS)
 TILT = Attached(EFFECTS["table_tilt"], PUCKS)
@@ -29,3 +32,23 @@ def test_one_of_a_pair_that_does_nothing_can_be_left_out_and_the_other_cannot(sw
     assert swirl.fit.point.cost < pair.fit.point.cost + 3.0
     assert tilt.fit.point.cost > 2.0 * pair.fit.point.cost
     assert swirl.fit.point.values[-5:-1] == pytest.approx(PLANTED[:4], rel=0.1)
+
+
+@pytest.mark.parametrize(("radius", "stands_in"), [(0.03, True), (0.05, False)])
+def test_a_field_as_narrow_as_its_range_allows_stands_for_something_else(radius: float, stands_in: bool) -> None:
+    fan = Attached(EFFECTS["fan_field"], PUCKS)
+    assert joint(planned_space(), fan, [0.02, -0.1, 0.0, radius, 0.5]).stands_in == stands_in
+    assert not joint(planned_space(), TILT, [1e-3, 0.0]).stands_in
+
+
+def test_what_an_impact_loses_is_found_beside_a_latency_though_dampings_take_it_away() -> None:
+    latency, slope = (Attached(EFFECTS[name], ()) for name in ("camera_latency", "rate_dependent_restitution"))
+    likelihood = recorded_with([latency, slope], [0.03, 0.5], np.concatenate([CALM, HELD_OUT]))
+    plain = refine(likelihood, simulator().defaults)
+    fit = plain.fit
+    first = begun(simulator(), plain.likelihood, fit.point, fit.free, fit.robust, Candidate(latency))
+    asked = [c for c in candidates(simulator()) if c.name in ("rate_dependent_restitution", "tangential_impulse")]
+    (best,) = _with_contacts(first, asked, 1.0)
+    assert best.added == (latency, slope)
+    assert best.fit.point.cost < first.fit.point.cost - 30.0
+    assert best.fit.point.values[-2:] == pytest.approx([0.03, 0.5], rel=0.1)
