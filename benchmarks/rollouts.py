@@ -2,8 +2,9 @@
 
     python benchmarks/rollouts.py [--rollouts 256] [--threads 0]
 
-The three contestants run in turn, several rounds; the best round of each counts. Bare: one model, no table friction, no
-effect, nothing done with the states. Ours: parameters written into a model each, controls made, friction, observation.
+The contestants run in turn, several rounds; the best round of each counts. `mujoco.rollout`: one model, no table
+friction, no effect, nothing done with the states; with MuJoCo's profiler, as `import mujoco` leaves it, and without.
+Ours: parameters written into a model each, controls made, friction, observation; never with the profiler.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ from compass_ros.types import Floats
 class Cost:
     """Seconds a rollout by the clock (wall) and of the processor (cpu), best of the rounds."""
 
+    profiled_wall: float
+    profiled_cpu: float
     bare_wall: float
     bare_cpu: float
     plain_wall: float
@@ -47,7 +50,8 @@ def compare(rollouts: int, threads: int, rounds: int, duration: float = 2.5) -> 
     values = np.tile(cell.defaults, (rollouts, 1))
     with_field = np.hstack([values, np.tile([0.3, 0.2, 0.0, 0.12, 0.5], (rollouts, 1))])
     runs: tuple[Callable[[], object], ...] = (
-        bare_run(plain, rollouts, values, shots, duration),
+        bare_run(plain, rollouts, values, shots, duration, profiler=True),
+        bare_run(plain, rollouts, values, shots, duration, profiler=False),
         lambda: plain.motion(values, shots, duration),
         lambda: field.motion(with_field, shots, duration),
     )
@@ -61,7 +65,9 @@ def compare(rollouts: int, threads: int, rounds: int, duration: float = 2.5) -> 
     return Cost(*best.ravel().tolist())
 
 
-def bare_run(like: Simulator, rollouts: int, values: Floats, shots: Floats, duration: float) -> Callable[[], object]:
+def bare_run(
+    like: Simulator, rollouts: int, values: Floats, shots: Floats, duration: float, profiler: bool
+) -> Callable[[], object]:
     """The same starts and controls on the scene as it is, by `mujoco.rollout` alone."""
     dynamics = dynamics_of(like.cell)
     model = dynamics.model
@@ -71,7 +77,15 @@ def bare_run(like: Simulator, rollouts: int, values: Floats, shots: Floats, dura
     controls = np.ascontiguousarray(dynamics.controls(values, shots, steps))
     data = [mujoco.MjData(model) for _ in range(like.threads)]
     pool = Rollout(nthread=like.threads)
-    return lambda: pool.rollout(model, data, start, controls, nstep=steps)
+
+    def run() -> object:
+        if profiler:
+            mujoco.MjData(model)  # the first one switches it on, and so does each after it was switched off
+        else:
+            mujoco.set_mjcb_time(None)
+        return pool.rollout(model, data, start, controls, nstep=steps)
+
+    return run
 
 
 def main() -> None:
@@ -83,14 +97,15 @@ def main() -> None:
     cost = compare(given.rollouts, given.threads, given.rounds)
     threads = given.threads or len(os.sched_getaffinity(0))
     print(f"{given.rollouts} rollouts of 2.5 s at 1 ms, {threads} threads, best of {given.rounds}")
-    print(f"{'':24}{'rollouts/s':>12}{'share':>8}{'ms of one core':>16}")
+    print(f"{'':28}{'rollouts/s':>12}{'share':>8}{'ms of one core':>16}")
     for name, wall, cpu, of in (
-        ("mujoco.rollout, bare", cost.bare_wall, cost.bare_cpu, cost.bare_wall),
+        ("mujoco.rollout, profiler on", cost.profiled_wall, cost.profiled_cpu, cost.bare_wall),
+        ("mujoco.rollout", cost.bare_wall, cost.bare_cpu, cost.bare_wall),
         ("Simulator", cost.plain_wall, cost.plain_cpu, cost.bare_wall),
         ("Simulator, fan_field", cost.field_wall, cost.field_cpu, cost.plain_wall),
     ):
-        print(f"{name:24}{1 / wall:12.0f}{of / wall:8.2f}{1e3 * cpu:16.2f}")
-    print("share: Simulator of bare, with the field of Simulator")
+        print(f"{name:28}{1 / wall:12.0f}{of / wall:8.2f}{1e3 * cpu:16.2f}")
+    print("share: of mujoco.rollout; with the field, of Simulator")
 
 
 if __name__ == "__main__":
