@@ -61,6 +61,27 @@ def neighbour_correlation(residual: Floats, seen: Bools) -> float:
     return float(np.clip(product / max(square, 1e-300), 0.0, MOST_CORRELATED))
 
 
+def integrated_correlation_time(residual: Floats, seen: Bools) -> float:
+    """Frames that one independent number is worth in (E, F, C) residuals: 1 + 2 * the sum of the autocorrelation.
+
+    The sum ends where two lags together are no longer positive (Geyer 1992, initial positive sequence).
+    """
+    known = np.where(seen, residual, 0.0)
+    frames, variance = residual.shape[1], float(np.sum(known**2)) / max(int(seen.sum()), 1)
+    total = 1.0
+    for lag in range(1, frames // 2, 2):
+        pair = sum(_autocovariance(known, seen, k) for k in (lag, lag + 1)) / max(variance, 1e-300)
+        if pair <= 0:
+            break
+        total += 2 * pair
+    return float(np.clip(total, 1.0, correlation_time(MOST_CORRELATED)))
+
+
+def _autocovariance(known: Floats, seen: Bools, lag: int) -> float:
+    both = seen[:, lag:] & seen[:, :-lag]
+    return float(np.sum(known[:, lag:] * known[:, :-lag] * both)) / max(int(both.sum()), 1)
+
+
 def correlated(white: Floats, correlation: float) -> Floats:
     """(E, F, C) AR(1) noise of unit variance along the frames, from white noise."""
     out = white.copy()

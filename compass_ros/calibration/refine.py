@@ -26,7 +26,7 @@ from compass_ros.calibration.least_squares import (
     start,
 )
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.noise import correlation_time, neighbour_correlation
+from compass_ros.calibration.noise import integrated_correlation_time
 from compass_ros.calibration.screen import WORTH, acting, coupling, independent, many
 from compass_ros.types import Floats, Ints
 
@@ -248,9 +248,13 @@ def information_share(likelihood: Likelihood, fit: Fit) -> float:
 
 
 def residual_correlation_time(likelihood: Likelihood, fit: Fit) -> float:
-    """Frames that one independent residual is worth, from the correlation of neighbours as in an AR(1) process."""
+    """Frames that one independent residual is worth.
+
+    What the model does not explain is slow and small beside white noise: neighbours hardly show it, all lags together
+    do.
+    """
     residual = np.clip(residual_at(likelihood, fit.point), -fit.robust, fit.robust)
-    return correlation_time(neighbour_correlation(residual, ~np.isnan(likelihood.measured)))
+    return integrated_correlation_time(residual, ~np.isnan(likelihood.measured))
 
 
 def calmed(likelihood: Likelihood, linear: Linear) -> Likelihood:

@@ -54,6 +54,8 @@ class Comparison:
     """Share of the excess held-out error that the effects remove."""
     held_out_m: Mapping[str, float]
     """rms on held-out episodes by model, and `floor`: what noise alone made there."""
+    apart_m: float | None
+    """What the nearest formula of the library leaves of an effect from outside it, rms [m]."""
     ordinary_z: float | None
     """Median |found - truth| / std of the cell's identifiable parameters."""
 
@@ -90,6 +92,7 @@ def compare(result: Json, answer: Json) -> Comparison:
         parameters=tuple(check for e in effects for check in _parameters(e, mismatch["effects"])) if named else (),
         gain=_gain(result, answer) if effects else None,
         held_out_m=_held_out(result, answer),
+        apart_m=single["nearest"]["left_m"] if kind == "outside" and single and single.get("nearest") else None,
         ordinary_z=_ordinary(result["parameters"], answer["parameters"]),
     )
 

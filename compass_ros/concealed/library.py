@@ -1,8 +1,8 @@
 """The truth of a world in the quantities of the library's effects.
 
-Laws here have other formulas on purpose. What an ideal fit with the library's formula would find is worked out by least
-squares on the accelerations along the true paths, each puck's ordinary friction free beside it. The formulas are those
-that the library's documentation gives.
+Laws here have other formulas on purpose. The library's formulas stand here once more, as its documentation gives them,
+to say which of their numbers come nearest to a law: first by the accelerations along the true paths, then by the
+trajectories (`imitation`).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from compass_ros.concealed.table import Played, Table
 from compass_ros.types import Floats
 
 _SLOW = 0.02  # m/s; slower pucks say nothing about a force
-_MAX_POINTS = 4000
+_MAX_POINTS, _FEW_POINTS = 4000, 1000
 
 Formula = Callable[[Floats, Moment], Floats]
 """Quantities, state -> (S, 2, 2) newtons."""
@@ -143,8 +143,8 @@ FORMS: Mapping[str, Form] = {
 }
 
 
-def in_library_terms(ingredient: Ingredient, table: Table, played: Played) -> dict[str, float]:
-    """Quantities of the library's effect of the same name; empty where they would mean nothing."""
+def in_library_terms(ingredient: Ingredient, played: Played) -> dict[str, float]:
+    """Quantities of the library's effect of the same name where they are arithmetic; empty elsewhere."""
     law = ingredient.law
     if law.library is not None:
         return dict(law.library(ingredient.size, ingredient.shape))
@@ -152,22 +152,23 @@ def in_library_terms(ingredient: Ingredient, table: Table, played: Played) -> di
         return {"deviation": 0.005 * ingredient.size * float(np.std(list(ingredient.shape.values())))}
     if law.name == "rate_dependent_restitution":
         return {"slope": _slope(ingredient, played)}
-    if law.name == "lens_distortion":
-        return {"k1": _first_term(ingredient, played)}
-    if law.name in FORMS:
-        return _fitted(ingredient, FORMS[law.name], table, played)
     return {}
 
 
-def _fitted(ingredient: Ingredient, form: Form, table: Table, played: Played) -> dict[str, float]:
-    """Quantities with which the formula comes nearest to the true force, beside a free friction of each puck."""
-    assert ingredient.law.force is not None
-    moments = _moments(table, played)
-    mask = np.array([name in ingredient.objects for name in PUCKS], dtype=float)[None, :, None]
+def along(
+    law: Ingredient, begin: Ingredient, form: Form, table: Table, played: Played, coarse: bool = False
+) -> tuple[Floats, float]:
+    """Numbers with which a formula comes nearest to a law's force along the true paths, and the share that is left.
+
+    Each puck's friction is free beside it. `begin`: where the search starts, in the numbers of the formula's own law.
+    """
+    assert law.law.force is not None
+    moments = on_paths(table, played, _FEW_POINTS if coarse else _MAX_POINTS)
+    mask = np.array([name in law.objects for name in PUCKS], dtype=float)[None, :, None]
     moving = [at.speed > _SLOW for at in moments]
-    truth = [mask * ingredient.law.force(ingredient.size, ingredient.shape, at) for at in moments]
+    truth = [mask * law.law.force(law.size, law.shape, at) for at in moments]
     frictions = [at.against(np.broadcast_to(at.load, at.speed.shape)) for at in moments]
-    start = np.array(form.start(ingredient))
+    start = np.array(form.start(begin))
     unit = np.sqrt(np.mean(np.concatenate([t[m] for t, m in zip(truth, moving, strict=True)]) ** 2)) + 1e-15
 
     def residual(x: Floats) -> Floats:
@@ -181,13 +182,13 @@ def _fitted(ingredient: Ingredient, form: Form, table: Table, played: Played) ->
     free = (-np.inf, np.inf)
     low, high = np.array([*(form.bounds.get(name, free) for name in form.names), free, free]).T
     found = least_squares(residual, np.concatenate([start, [0.0, 0.0]]), bounds=(low, high), x_scale=scale, max_nfev=60)
-    return {name: float(value) for name, value in zip(form.names, found.x, strict=False)}
+    return found.x[:-2], float(np.mean(found.fun**2))
 
 
-def _moments(table: Table, played: Played) -> list[Moment]:
-    """States along the true paths, some dozens a second."""
+def on_paths(table: Table, played: Played, points: int) -> list[Moment]:
+    """States along the true paths, evenly in time; about so many `points` of shots and pucks together."""
     steps, shots = played.position.shape[:2]
-    stride = max(1, steps * shots * 2 // _MAX_POINTS)
+    stride = max(1, steps * shots * 2 // points)
     return [
         table.moment(step * played.time_step, played.position[step], played.velocity[step])
         for step in range(0, steps, stride)
@@ -204,11 +205,3 @@ def _slope(ingredient: Ingredient, played: Played) -> float:
     factors = np.array([ingredient.law.damping(ingredient.size, ingredient.shape, v) for v in speeds])
     rise, at_rest = np.polyfit(speeds, factors, 1, w=speeds)
     return float(rise / at_rest / 0.849)
-
-
-def _first_term(ingredient: Ingredient, played: Played) -> float:
-    """Least squares of the whole distortion by its first term, over all positions."""
-    points = played.position.reshape(-1, 2)[::97]
-    r2 = np.sum(points**2, axis=1)
-    bent = 0.05 * ingredient.size * ingredient.shape["hand"] * (r2 + ingredient.shape["k2"] * r2**2)
-    return float(np.sum(r2 * bent * r2) / np.sum(r2 * r2 * r2))

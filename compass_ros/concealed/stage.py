@@ -102,7 +102,7 @@ def _effect(cell: Cell, values: Floats, inputs: Floats, name: str, rng: np.rando
     judge = Judge(table, absorber, np.tile(times, (len(inputs), 1)), table.play())
     target = float(np.exp(rng.uniform(np.log(WEAKEST), np.log(STRONGEST))))
     found = strong_enough(KNOWN[name], True, places_of(judge.base), judge, target, (), rng)
-    return described(found, (judge, judge), table.play([found.ingredient]))
+    return described(found, judge, table.play([found.ingredient]))
 
 
 def _has_physics(cell: Cell) -> None:

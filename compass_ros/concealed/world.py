@@ -11,6 +11,7 @@ from numpy.random import Generator
 
 from compass_ros.cells import Cell
 from compass_ros.concealed.absorption import Absorber, rms
+from compass_ros.concealed.imitation import Imitation, best_imitation, ideal
 from compass_ros.concealed.law import PUCKS, WALLS, Ingredient, Law, Places
 from compass_ros.concealed.laws import KNOWN, LAWS, OUTSIDE, known
 from compass_ros.concealed.library import in_library_terms
@@ -92,7 +93,7 @@ def conceal(cell: Cell, wishes: Wishes) -> World:
         "forms": wishes.forms,
         "time_step_s": TIME_STEP,
         "kind": kind,
-        "effects": [described(s, judges, played) for s in found],
+        "effects": [described(s, judges[1], played) for s in found],
         "parameters": {p.name: float(v) for p, v in zip(cell.parameters, values, strict=True)},
         "noise_floor_m": floor,
         "numerics_rms_m": _numerics(judges[0], bias),
@@ -184,9 +185,8 @@ def places_of(played: Played) -> Places:
     return Places(played.position[moving], played.touched(), played.position.shape[1])
 
 
-def described(strength: Strength, judges: tuple[Judge, Judge], played: Played) -> dict[str, object]:
-    """What the answer says of an effect."""
-    fine, coarse = judges
+def described(strength: Strength, coarse: Judge, played: Played) -> dict[str, object]:
+    """What the answer says of an effect. `coarse`: the world without laws on the coarser clock."""
     i = strength.ingredient
     share = np.sum(strength.left.reshape(-1, 2, 2) ** 2, axis=(0, 2))
     share = share / share.sum()
@@ -195,9 +195,16 @@ def described(strength: Strength, judges: tuple[Judge, Judge], played: Played) -
     alike |= {"all"} if i.law.on == "wall" else set()
     twin = twins(strength, coarse)
     centre = [i.shape["centre_x"], i.shape["centre_y"]] if "centre_x" in i.shape else None
+    outside = i.law.name in OUTSIDE
+    numbers: Mapping[str, float] = {}
+    if outside:
+        near: Imitation | None = best_imitation(strength, coarse, places_of(coarse.base), played)
+    else:
+        near = ideal(strength, coarse, played)
+        numbers = near.numbers if near else in_library_terms(i, played)
     return {
         "name": i.law.name,
-        "outside": i.law.name in OUTSIDE,
+        "outside": outside,
         "channel": i.law.channel,
         "phase": i.law.phases[0],
         "phases_right": sorted({*i.law.phases, *(phase for name in twin for phase in KNOWN[name].phases)}),
@@ -207,7 +214,8 @@ def described(strength: Strength, judges: tuple[Judge, Judge], played: Played) -
         "centre_m": centre,
         "size": i.size,
         "shape": dict(i.shape),
-        "library": in_library_terms(i, fine.table, played),
+        "library": dict(numbers),
+        "nearest": {"name": near.name, "left_m": near.left_m} if near else None,
         "rms_before_m": rms(strength.change),
         "rms_m": strength.rms_m,
         "share_of_objects": {puck: float(part) for puck, part in zip(PUCKS, share, strict=True)},

@@ -197,19 +197,28 @@ def _in_pairs(choice: Choice, space: Space, candidates: Sequence[Candidate], uns
     best, *others = different(choice.singles)
     firsts = [best] if choice.share(best) > LEADS else [best, *(converge(j, slight, 4) for j in others[:1])]
     pairs = _pairs(firsts, candidates, slight)
-    if pairs:
-        alone = [further(_one_of(pairs[0], i, space), slight, 5) for i in (0, 1)]
-        choice = choice.of(sorted([*alone, *choice.singles], key=worth))
-        if choice.good(unseen):
-            return _concluded(choice, candidates, unseen)
+    if not pairs:
+        return choice
+    led, choice = pairs[0], _with_each(pairs[0], choice, space)
+    if not choice.good(unseen) and not _surely(choice, pairs, unseen):
+        pairs += _with_contacts(different(choice.singles)[0], candidates, slight)
         if not _surely(choice, pairs, unseen):
-            pairs += _with_contacts(different(choice.singles)[0], candidates, slight)
-        if not _surely(choice, pairs, unseen):
-            pairs += _pairs(alone[1:], candidates, slight)
-    pair = max(pairs, key=lambda p: evidence(p, unseen), default=None)
-    if pair and pair.fit.point.cost < min(j.fit.point.cost for j in choice.singles):
+            second = next(j for j in choice.singles if j.added == led.added[1:])
+            pairs += _pairs([second], candidates, slight)
+    pair = max(pairs, key=lambda p: evidence(p, unseen))
+    if not choice.good(unseen) and pair is not led:
+        choice = _with_each(pair, choice, space)
+    if choice.good(unseen):
+        return _concluded(choice, candidates, unseen)
+    if pair.fit.point.cost < min(j.fit.point.cost for j in choice.singles):
         choice = choice.shown_by(pair)
     return replace(choice, pair=pair)
+
+
+def _with_each(pair: Joint, choice: Choice, space: Space) -> Choice:
+    """The same with each effect of a pair alone: the way to a pair may need an effect that is not there."""
+    alone = [further(_one_of(pair, i, space), SLIGHT * choice.excess, 5) for i in (0, 1)]
+    return choice.of(sorted([*alone, *choice.singles], key=worth))
 
 
 def _surely(choice: Choice, pairs: Sequence[Joint], unseen: HeldOut) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compass_ros.calibration.noise import measure_noise
+from compass_ros.calibration.noise import correlated, integrated_correlation_time, measure_noise
 from compass_ros.types import Floats
 
 RATE = 60.0
@@ -76,3 +76,17 @@ def test_columns_that_are_alike_are_judged_together() -> None:
     assert np.ptp(found, axis=1).max() == 0
     assert np.std(found) < 0.03e-3
     assert np.mean(found) == pytest.approx(1e-3, rel=0.015)
+
+
+@pytest.mark.parametrize(("slow", "correlation"), [(0.0, 0.0), (1.0, 0.5), (0.15, 0.9), (0.3, 0.95)])
+def test_what_is_slow_beside_white_noise_counts_over_all_lags(slow: float, correlation: float) -> None:
+    """Variance of a mean of white noise and an AR(1) process: (1 + slow (1 + r) / (1 - r)) / n."""
+    rng = np.random.default_rng(0)
+    shape = (9, 150, 4)
+    seen = rng.random(shape) > 0.1
+    times = []
+    for _ in range(20):
+        residual = rng.standard_normal(shape) + np.sqrt(slow) * correlated(rng.standard_normal(shape), correlation)
+        times.append(integrated_correlation_time(np.where(seen, residual, 99.0), seen))
+    expected = (1 + slow * (1 + correlation) / (1 - correlation)) / (1 + slow)
+    assert np.mean(times) == pytest.approx(expected, rel=0.1)

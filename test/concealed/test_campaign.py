@@ -11,11 +11,13 @@ import pytest
 from compass_ros.concealed.proof import campaign, lines
 from compass_ros.concealed.proof.campaign import Plan, prove
 from compass_ros.concealed.proof.lines import Key
+from compass_ros.concealed.proof.one_world import SUITES
 from compass_ros.concealed.proof.page import BEGIN, END, write_page
 from compass_ros.concealed.proof.statistics import table
 from compass_ros.errors import ConfigError
 
 PLAN = Plan(("main",), worlds=3)
+SEEDS = [SUITES["main"].first_seed + i for i in range(3)]
 
 
 def marks(**given: Any) -> dict[str, Any]:
@@ -63,10 +65,10 @@ def test_a_stopped_run_goes_on_where_it_was(tmp_path: Path) -> None:
     path, first, second = tmp_path / "proof" / "results.jsonl", Runner(stop_after=2), Runner()
     with pytest.raises(KeyboardInterrupt):
         prove(PLAN, path, 1, quiet, first)
-    assert sorted(key.seed for key in lines.read(path)) == first.seeds == [90000, 90001]
+    assert sorted(key.seed for key in lines.read(path)) == first.seeds == SEEDS[:2]
     prove(PLAN, path, 1, quiet, second)
-    assert second.seeds == [90002]
-    assert [json.loads(line)["seed"] for line in path.read_text().splitlines()] == [90000, 90001, 90002]
+    assert second.seeds == SEEDS[2:]
+    assert [json.loads(line)["seed"] for line in path.read_text().splitlines()] == SEEDS
 
 
 @pytest.mark.parametrize("what", ["METHOD", "WORLDS"])
@@ -77,7 +79,7 @@ def test_worlds_of_an_older_method_are_run_again(tmp_path: Path, monkeypatch: py
     assert done.seeds == []
     monkeypatch.setattr(lines, what, ("errors.py",))
     prove(PLAN, path, 1, quiet, again)
-    assert again.seeds == [90000, 90001, 90002]
+    assert again.seeds == SEEDS
     assert len(lines.read(path)) == 3
 
 
@@ -88,7 +90,7 @@ def test_a_run_that_failed_is_kept_counted_and_tried_again(tmp_path: Path) -> No
     (line,) = lines.read(path).values()
     assert table([line])[0].count == "0 of 1"
     prove(Plan(("main",), 1), path, 1, quiet, again)
-    assert again.seeds == [90000]
+    assert again.seeds == SEEDS[:1]
 
 
 def test_a_line_says_what_made_it(tmp_path: Path) -> None:
@@ -143,7 +145,8 @@ def test_rows_look_at_their_own_worlds() -> None:
         {"right": False, "misnamed": True, "phase_right": False, "first_right": False},
         {"kind": "none", "truth": [], "verdict": "none", "parameters": [], "gain": None},
         {"kind": "two", "parameters": [{"error": 0.2, "covered": False}], "right": False},
-        {"kind": "outside", "verdict": "unknown", "parameters": [], "gain": None},
+        {"kind": "outside", "verdict": "unknown", "parameters": [], "gain": None, "apart_m": 2e-3},
+        {"kind": "outside", "verdict": "unknown", "parameters": [], "gain": None, "apart_m": 2e-4},
     )
     rows = {row.what: row for row in table(found)}
     assert rows["one effect, named right or within its class"].count == "1 of 2"
@@ -152,7 +155,8 @@ def test_rows_look_at_their_own_worlds() -> None:
     assert rows["one effect: object, phase and channel right"].count == "1 of 2"
     assert rows["two effects, both named or within their classes"].reached is False
     assert rows["nothing missing: none"].value == "100 %"
-    assert rows["outside the library: unknown"].reached is True
+    assert rows["outside the library: unknown"].count == "2 of 2"
+    assert rows["of these, where no formula of the library comes within 1 mm rms"].count == "1 of 1"
     assert rows["parameters of effects: median error"].value == "3.0 %"
     assert rows["parameters of effects: 90 % intervals hold the truth"].count == "2 of 3"
     assert rows["calibration and discovery, median [s]"].value == "60"

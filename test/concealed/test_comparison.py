@@ -28,7 +28,12 @@ LATENCY = EFFECT | {
     "channels_right": ["actuation", "sensing"],
 }
 TILT = EFFECT | {"name": "table_tilt", "centre_m": None, "library": {"tilt_x": 0.003, "tilt_y": -0.004}}
-STRANGE = EFFECT | {"name": "ring_bump", "outside": True, "library": {}}
+STRANGE = EFFECT | {
+    "name": "ring_bump",
+    "outside": True,
+    "library": {},
+    "nearest": {"name": "swirl", "left_m": 4e-4},
+}
 WHERE = {"object": "all", "phase": "free", "channel": "dynamics", "region": None, "time_s": None}
 
 
@@ -128,6 +133,7 @@ def test_something_from_outside() -> None:
     marks = compare(result("unknown", where=WHERE | {"region": region}), answer("outside", STRANGE))
     assert (marks.right, marks.misnamed, marks.first_right) == (True, False, None)
     assert marks.centre_error_m == pytest.approx(0.01)
+    assert marks.apart_m == pytest.approx(4e-4)
     assert compare(result("named", fitted("fan_field")), answer("outside", STRANGE)).misnamed
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from compass_ros.concealed.law import Ingredient
 from compass_ros.concealed.laws import KNOWN, LAWS, OUTSIDE
-from compass_ros.concealed.library import in_library_terms
+from compass_ros.concealed.library import FORMS, along, in_library_terms
 from compass_ros.concealed.table import Played
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
@@ -78,7 +78,12 @@ def _library(name: str, own: Ingredient, base: Played) -> Floats:
     effect = EFFECTS[name]
     objects = own.objects if effect.on in {"objects", "walls"} else ()
     simulator = Simulator(cell(), [Attached(effect, objects)], threads=1)
-    terms = in_library_terms(own, table(), table().play([own]))
+    played = table().play([own])
+    terms = in_library_terms(own, played)
+    if name in FORMS:
+        terms = dict(zip(FORMS[name].names, along(own, own, FORMS[name], table(), played)[0], strict=True))
+    if name == "lens_distortion":
+        terms = {"k1": 0.05 * own.size * own.shape["hand"]}
     numbers = np.array([[terms[q.name] for q in effect.quantities]] * len(INPUTS))
     if name == "stroke_jitter":
         numbers = np.array([[0.005 * own.size * own.shape[f"shot_{i}"]] for i in range(len(INPUTS))])

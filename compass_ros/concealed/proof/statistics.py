@@ -13,6 +13,7 @@ from compass_ros.concealed.proof.lines import Line
 
 _LEVEL = 0.95
 _CENTRE_M = 0.02
+_APART_M = 1e-3
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ def table(found: Sequence[Line]) -> list[Row]:
     """The rows for the worlds of one suite and method. A world whose run failed counts as wrong, never as missing."""
     one, two, none, outside = ([x for x in found if _kind(x) == kind] for kind in ("one", "two", "none", "outside"))
     alone = [x for x in one if _mark(x, "first_right") is not None and _mark(x, "right")]
+    apart = [x for x in outside if (_mark(x, "apart_m") or 0.0) >= _APART_M]
     checks = [c for x in found for c in _marks(x).get("parameters", ())]
     centres = [_mark(x, "centre_error_m") for x in one if _mark(x, "right") and _mark(x, "centre_error_m") is not None]
     gains = [_mark(x, "gain") for x in one + two if _mark(x, "gain") is not None]
@@ -41,6 +43,7 @@ def table(found: Sequence[Line]) -> list[Row]:
         _share("two effects, both named or within their classes", two, "right", 0.75),
         _share("nothing missing: none", none, "right", 0.97),
         _share("outside the library: unknown", outside, "right", 0.90),
+        _share("of these, where no formula of the library comes within 1 mm rms", apart, "right", 0.90),
         _where("outside the library: object, phase and channel right", outside, 0.90),
         _share("outside the library: misnamed", outside, "misnamed", 0.03, most=True),
         _share("one effect: misnamed", one, "misnamed", 0.03, most=True),
