@@ -155,6 +155,7 @@ def test_rows_look_at_their_own_worlds() -> None:
     assert rows["one effect: object, phase and channel right"].count == "1 of 2"
     assert rows["two effects, both named or within their classes"].reached is False
     assert rows["nothing missing: none"].value == "100 %"
+    assert rows["outside the library: unknown"].reached is True
     assert rows["outside the library: unknown"].count == "2 of 2"
     assert rows["of these, where no formula of the library comes within 1 mm rms"].count == "1 of 1"
     assert rows["parameters of effects: median error"].value == "3.0 %"
