@@ -66,20 +66,20 @@ def integrated_correlation_time(residual: Floats, seen: Bools) -> float:
 
     The sum ends where two lags together are no longer positive (Geyer 1992, initial positive sequence).
     """
-    known = np.where(seen, residual, 0.0)
-    frames, variance = residual.shape[1], float(np.sum(known**2)) / max(int(seen.sum()), 1)
+    variance = float(np.mean(residual[seen] ** 2)) if seen.any() else 1.0
     total = 1.0
-    for lag in range(1, frames // 2, 2):
-        pair = sum(_autocovariance(known, seen, k) for k in (lag, lag + 1)) / max(variance, 1e-300)
+    for lag in range(1, residual.shape[1] // 2, 2):
+        pair = sum(autocovariance(residual, seen, k) for k in (lag, lag + 1)) / max(variance, 1e-300)
         if pair <= 0:
             break
         total += 2 * pair
     return float(np.clip(total, 1.0, correlation_time(MOST_CORRELATED)))
 
 
-def _autocovariance(known: Floats, seen: Bools, lag: int) -> float:
+def autocovariance(residual: Floats, seen: Bools, lag: int) -> float:
+    """Mean product of (E, F, C) residuals that are so many frames apart; 0 where no two were seen."""
     both = seen[:, lag:] & seen[:, :-lag]
-    return float(np.sum(known[:, lag:] * known[:, :-lag] * both)) / max(int(both.sum()), 1)
+    return float(np.mean((residual[:, lag:] * residual[:, :-lag])[both])) if both.any() else 0.0
 
 
 def correlated(white: Floats, correlation: float) -> Floats:

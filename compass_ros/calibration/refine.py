@@ -26,7 +26,7 @@ from compass_ros.calibration.least_squares import (
     start,
 )
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.noise import integrated_correlation_time
+from compass_ros.calibration.residuals import chi_square, covariance, information_share, typical_residual
 from compass_ros.calibration.screen import WORTH, acting, coupling, independent, many
 from compass_ros.types import Floats, Ints
 
@@ -229,34 +229,6 @@ def _best_step(likelihood: Likelihood, point: Point, linear: Linear, free: Ints,
     return replace(trials[best], cost=float(costs[best])), residuals[best]
 
 
-def covariance(likelihood: Likelihood, fit: Fit) -> Floats:
-    """(n, n) of free parameters, then launches, in the prior's standard deviations.
-
-    The data's part of the Hessian is divided by what neighbouring frames repeat of each other, in the noise or in the
-    residual, and by the residual's variance where that is above the noise: what the model does not explain is no
-    information about its parameters.
-    """
-    hessian, _ = normal_equations(likelihood, fit.point, fit.linear, fit.free, fit.robust)
-    prior = np.eye(len(hessian))
-    return np.asarray(np.linalg.inv((hessian - prior) * information_share(likelihood, fit) + prior))
-
-
-def information_share(likelihood: Likelihood, fit: Fit) -> float:
-    """What is left of the recordings' information where frames repeat each other or the model does not explain them."""
-    repeated = max(likelihood.correlation_time, residual_correlation_time(likelihood, fit))
-    return 1 / (repeated * max(chi_square(likelihood, fit), 1.0))
-
-
-def residual_correlation_time(likelihood: Likelihood, fit: Fit) -> float:
-    """Frames that one independent residual is worth.
-
-    What the model does not explain is slow and small beside white noise: neighbours hardly show it, all lags together
-    do.
-    """
-    residual = np.clip(residual_at(likelihood, fit.point), -fit.robust, fit.robust)
-    return integrated_correlation_time(residual, ~np.isnan(likelihood.measured))
-
-
 def calmed(likelihood: Likelihood, linear: Linear) -> Likelihood:
     """Trust frames less that the parameters move by more than CALM sigma per prior width.
 
@@ -293,25 +265,6 @@ def sensitivity(likelihood: Likelihood, point: Point) -> Influence:
     onset = np.zeros((len(likelihood.inputs), count))
     onset[:, asked] = coarse.onset
     return Influence(point, strength, steps, gram, changes, onset)
-
-
-def typical_residual(likelihood: Likelihood, point: Point) -> float:
-    """Median size of a residual [sigma], scaled to a standard deviation."""
-    residual = residual_at(likelihood, point)
-    return float(np.median(np.abs(residual[~np.isnan(likelihood.measured)]))) / 0.6745
-
-
-def residual_at(likelihood: Likelihood, point: Point) -> Floats:
-    """(E, F, C) residuals at a point."""
-    episodes = np.arange(len(likelihood.inputs))
-    return likelihood.residual(np.tile(point.values, (len(episodes), 1)), likelihood.inputs + point.launch, episodes)
-
-
-def chi_square(likelihood: Likelihood, fit: Fit) -> float:
-    """Mean squared residual, outliers clipped as the loss does, over the degrees of freedom that remain."""
-    measured = ~np.isnan(likelihood.measured)
-    squared = np.minimum(residual_at(likelihood, fit.point)[measured] ** 2, fit.robust**2)
-    return float(np.sum(squared) / max(len(squared) - len(fit.free), 1))
 
 
 def with_roughness(likelihood: Likelihood, fit: Fit, draws: int = 6) -> Likelihood:

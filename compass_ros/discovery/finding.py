@@ -10,7 +10,8 @@ import numpy as np
 
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
-from compass_ros.calibration.refine import Refined, covariance, with_launches
+from compass_ros.calibration.refine import Refined, with_launches
+from compass_ros.calibration.residuals import covariance
 from compass_ros.discovery.choose import Choice
 from compass_ros.discovery.formula import Proposal, propose
 from compass_ros.discovery.joint import Joint, from_second_start

@@ -14,7 +14,7 @@ from scipy.ndimage import median_filter
 
 from compass_ros.calibration.least_squares import Fit, minimise
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import residual_at
+from compass_ros.calibration.residuals import residual_at
 from compass_ros.types import Floats
 
 LOST = 4.0

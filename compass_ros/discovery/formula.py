@@ -19,7 +19,8 @@ from math import comb, log
 import numpy as np
 
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import residual_at, with_launches
+from compass_ros.calibration.refine import with_launches
+from compass_ros.calibration.residuals import residual_at
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.joint import Joint, fit_jointly
 from compass_ros.discovery.screen import Score, Space

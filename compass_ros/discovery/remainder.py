@@ -6,8 +6,8 @@ import numpy as np
 
 from compass_ros.calibration.least_squares import Point, robust_weight
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.noise import correlation_of
-from compass_ros.calibration.refine import residual_at
+from compass_ros.calibration.noise import autocovariance, correlation_of
+from compass_ros.calibration.residuals import residual_at
 
 _LAGS = (1, 2, 3, 4)
 """Frames over which what is missing hardly changes."""
@@ -24,10 +24,5 @@ def smooth_excess(likelihood: Likelihood, point: Point, robust: float) -> float:
     residual = residual * np.sqrt(robust_weight(residual, robust))  # as the robust loss counts it
     seen = ~np.isnan(likelihood.measured)
     correlation = correlation_of(likelihood.correlation_time)
-    found = []
-    for lag in _LAGS:
-        both = seen[:, lag:] & seen[:, :-lag]
-        if both.any():
-            product = residual[:, lag:] * residual[:, :-lag]
-            found.append(float(np.mean(product[both])) - correlation**lag)
-    return float(np.mean(found)) if found else 0.0
+    lags = [lag for lag in _LAGS if (seen[:, lag:] & seen[:, :-lag]).any()]
+    return float(np.mean([autocovariance(residual, seen, lag) - correlation**lag for lag in lags])) if lags else 0.0

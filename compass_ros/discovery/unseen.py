@@ -9,7 +9,8 @@ from scipy.linalg import block_diag
 
 from compass_ros.calibration.least_squares import Fit, difference_steps, linearise, robust_loss, robust_weight
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import ROBUST, Refined, calmed, covariance, with_launches
+from compass_ros.calibration.refine import ROBUST, Refined, calmed, with_launches
+from compass_ros.calibration.residuals import covariance
 from compass_ros.discovery.joint import Joint
 
 HELD_OUT_SHARE = 0.4

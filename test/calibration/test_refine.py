@@ -10,7 +10,8 @@ from scipy.optimize import minimize_scalar
 
 from compass_ros.calibration.least_squares import Point, minimise, start
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import Refined, chi_square, growing, refine, standard_errors
+from compass_ros.calibration.refine import Refined, growing, refine, standard_errors
+from compass_ros.calibration.residuals import chi_square
 from compass_ros.types import Floats
 from test.calibration.toys import likelihood, oscillation
 from test.simulation.table import actions, cell, simulator

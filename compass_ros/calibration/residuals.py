@@ -1,0 +1,56 @@
+"""What a fit leaves unexplained, and how sure its parameters are in spite of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from compass_ros.calibration.least_squares import Fit, Point, normal_equations
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.noise import integrated_correlation_time
+from compass_ros.types import Floats
+
+
+def residual_at(likelihood: Likelihood, point: Point) -> Floats:
+    """(E, F, C) residuals at a point."""
+    episodes = np.arange(len(likelihood.inputs))
+    return likelihood.residual(np.tile(point.values, (len(episodes), 1)), likelihood.inputs + point.launch, episodes)
+
+
+def typical_residual(likelihood: Likelihood, point: Point) -> float:
+    """Median size of a residual [sigma], scaled to a standard deviation."""
+    residual = residual_at(likelihood, point)
+    return float(np.median(np.abs(residual[~np.isnan(likelihood.measured)]))) / 0.6745
+
+
+def chi_square(likelihood: Likelihood, fit: Fit) -> float:
+    """Mean squared residual, outliers clipped as the loss does, over the degrees of freedom that remain."""
+    return _chi_square(residual_at(likelihood, fit.point), likelihood, fit)
+
+
+def _chi_square(residual: Floats, likelihood: Likelihood, fit: Fit) -> float:
+    squared = np.minimum(residual[~np.isnan(likelihood.measured)] ** 2, fit.robust**2)
+    return float(np.sum(squared) / max(len(squared) - len(fit.free), 1))
+
+
+def covariance(likelihood: Likelihood, fit: Fit) -> Floats:
+    """(n, n) of free parameters, then launches, in the prior's standard deviations.
+
+    The data's part of the Hessian is divided by what frames repeat of each other, in the noise or in the residual, and
+    by the residual's variance where that is above the noise: what the model does not explain is no information about
+    its parameters.
+    """
+    hessian, _ = normal_equations(likelihood, fit.point, fit.linear, fit.free, fit.robust)
+    prior = np.eye(len(hessian))
+    return np.asarray(np.linalg.inv((hessian - prior) * information_share(likelihood, fit) + prior))
+
+
+def information_share(likelihood: Likelihood, fit: Fit) -> float:
+    """What is left of the recordings' information where frames repeat each other or the model does not explain them.
+
+    What the model does not explain is slow and small beside white noise: neighbours hardly show it, all lags together
+    do.
+    """
+    residual = residual_at(likelihood, fit.point)
+    clipped = np.clip(residual, -fit.robust, fit.robust)
+    repeated = integrated_correlation_time(clipped, ~np.isnan(likelihood.measured))
+    return 1 / (max(likelihood.correlation_time, repeated) * max(_chi_square(residual, likelihood, fit), 1.0))
