@@ -112,12 +112,12 @@ def pose(simulator: Simulator, data: Recordings, noise: Noise) -> Problem:
         predict=simulator.observe,
         predict_alike=simulator.observe_alike,
         parameters=simulator.parameters,
-        inputs=data.inputs,
+        inputs=simulator.inputs(data.inputs),
         time_s=data.time_s,
         measured=data.measured,
         sigma=np.broadcast_to(noise.sigma, data.measured.shape).copy(),
         correlation_time=noise.correlation_time,
-        launch_std=cell.launch_std,
+        launch_std=simulator.launch_std(simulator.defaults),
         prior_mean=simulator.defaults,
         prior_std=np.array([p.half_width for p in simulator.parameters]),
     )
@@ -217,7 +217,8 @@ def launched(simulator: Simulator, data: Recordings, noise: Noise, values: Float
     How an arm repeats itself, or a first state that was measured with noise, differs from shot to shot: it says
     nothing about a simulator. Where the cell calls its launches exact they stay as commanded.
     """
-    return Replay(simulator, data, with_launches(pose(simulator, data, noise).likelihood, values).launch)
+    likelihood = replace(pose(simulator, data, noise).likelihood, launch_std=simulator.launch_std(values))
+    return Replay(simulator, data, with_launches(likelihood, values).launch)
 
 
 def noise_floor(cell: Cell, noise: Noise) -> float:

@@ -79,8 +79,9 @@ class Likelihood:
         )
 
     def on(self, other: Likelihood) -> Likelihood:
-        """The same model and prior for the recordings of another likelihood."""
-        return replace(self, inputs=other.inputs, time_s=other.time_s, measured=other.measured, sigma=other.sigma)
+        """The same model and prior for the recordings of another likelihood, which may lack the last inputs."""
+        inputs = np.pad(other.inputs, ((0, 0), (0, self.inputs.shape[1] - other.inputs.shape[1])))
+        return replace(self, inputs=inputs, time_s=other.time_s, measured=other.measured, sigma=other.sigma)
 
     def residual(self, values: Floats, inputs: Floats, episode: Ints) -> Floats:
         """(B, F, C) residuals in sigma for (B, P) values and (B, A) inputs; 0 where nothing was measured."""

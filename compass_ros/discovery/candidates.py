@@ -7,11 +7,6 @@ from dataclasses import dataclass
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
 
-ACTUATED = frozenset({"actuation_delay", "first_order_lag", "velocity_saturation", "dead_band", "heading_bias"})
-PLANAR_ONLY = frozenset({"heading_bias", "camera_rotation", "lens_distortion", "rolling_shutter"})
-NOT_FITTED = frozenset({"stroke_jitter"})
-"""Random from episode to episode: judged by the scatter of the launches, see launches.py."""
-
 
 @dataclass(frozen=True)
 class Candidate:
@@ -30,11 +25,11 @@ class Candidate:
 
 
 def candidates(simulator: Simulator) -> tuple[Candidate, ...]:
-    """All effects that can act in this cell: on all its movers together, on each alone, on each wall."""
+    """All laws that can act in this cell: on all its movers together, on each alone, on each wall."""
     movers = simulator.movers()
     out: list[Candidate] = []
-    for name, effect in EFFECTS.items():
-        if name in NOT_FITTED or (effect.channel == "actuation" and not simulator.actuated):
+    for effect in EFFECTS.values():
+        if effect.scattered or (effect.channel == "actuation" and not simulator.actuated):
             continue
         if effect.on == "cell":
             sets: list[tuple[str, ...]] = [()]
@@ -44,3 +39,8 @@ def candidates(simulator: Simulator) -> tuple[Candidate, ...]:
             sets = [movers] if len(movers) < 2 else [movers, *((m,) for m in movers)]
         out.extend(Candidate(Attached(effect, objects)) for objects in sets if simulator.accepts(effect, objects))
     return tuple(out)
+
+
+def scattered(simulator: Simulator) -> tuple[Candidate, ...]:
+    """Effects that differ from episode to episode by chance."""
+    return tuple(Candidate(Attached(e, ())) for e in EFFECTS.values() if e.scattered and simulator.actuated)

@@ -3,139 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import (
-    Fit,
-    Point,
-    cost,
-    minimise,
-)
-from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.least_squares import Point, cost, minimise
 from compass_ros.discovery.beginning import begun
-from compass_ros.discovery.candidates import Candidate
+from compass_ros.discovery.candidates import Candidate, scattered
+from compass_ros.discovery.choice import LEADERS, PREDICTS, Choice, evidence, floor_of
 from compass_ros.discovery.joint import Joint, converge, from_second_start, widened
-from compass_ros.discovery.remainder import smooth_excess
+from compass_ros.discovery.scatter import fit_scattered, follows_command
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import screen
 from compass_ros.discovery.trials import TRIED, at_other_rates, different, further, sketched, worth
 from compass_ros.discovery.unseen import HeldOut
 
-ENOUGH = 0.93
-"""Share of the excess (cost above the noise floor) that a single effect must explain to be named alone."""
-PAIR_ENOUGH = 0.95
-"""The same for two effects."""
 SURELY = 0.98
 """Share below which the first of two is chosen once more, beside the second."""
-SMALL = 0.12
-"""Excess of chi-square under which a remainder is put down to the effect's functional form..."""
-FORM_SHARE = 0.6
-"""...if the effect explains at least this share."""
 EQUAL = 3.0
 """Log evidence within which two effects are told apart by nothing."""
 EQUAL_SHARE = 0.015
 """The same as a share of the excess: functional forms are never exactly right."""
-PREDICTS = 0.92
-"""Share of the held-out excess that what is named must remove, but for a SMALL remainder: less is another law's."""
-CLEAR = 0.95
-"""Share from which an effect whose rivals all leave MANY_TIMES as much is named though it predicts less than that: what
-its form gets wrong grows in episodes that were not fitted."""
-LITTLE, MANY_TIMES, SEVERAL = 0.12, 4.0, 2
-"""Share that an effect may leave where at least so many others, fitted as well, leave so many times as much."""
 NEEDED, SEEN = 0.05, 0.04
 """Share of the excess that an effect must be worth beside another that is enough; or the excess of chi-square that the
 other leaves."""
-FORM_LEFT = 0.25
-"""Part of what one effect leaves that a second may leave to be its cause."""
 OF_LIMIT = 8.0
 """Log evidence by which an effect must surpass what it comes to at an end of its shapes."""
 LEADS = 0.6
 """Share from which the best effect is surely one of two; below, the second best may be instead."""
 NEARLY = 0.85
 """Share from which the best effect is first fitted from a second start before others are tried."""
-LEADERS = 4
-"""Best fits that are continued, and of which one may be named."""
 CLOSE = 4.0
 """How far behind the best pair a second one may be to be followed too, in steps that promise SLIGHT."""
 OF_CONTACTS, FOLLOWED = (0.06, 0.5), 2
 """Sizes from which effects of contacts are followed beside another effect, in their scale; how many to the end."""
 SLIGHT = 0.005
 """Share of the excess that a further step of a fit must promise: models are compared by shares of it."""
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Fitted models, the best first."""
-
-    singles: tuple[Joint, ...]
-    pair: Joint | None
-    excess: float
-    """Cost of the plain model above the noise floor."""
-    floor: float
-    """Cost that the noise alone leaves."""
-    two: bool = False
-    """The first single is enough, and the pair still explains what it leaves: there are two."""
-    equal: tuple[Joint, ...] = ()
-    """Where the first single is enough: others that explain the recordings as well."""
-
-    def of(self, singles: Sequence[Joint]) -> Choice:
-        """The same recordings with these models; shares are of what the best shows to be above the noise."""
-        best = min(singles, key=lambda j: j.fit.point.cost)
-        return replace(self.shown_by(best), singles=tuple(singles))
-
-    def shown_by(self, joint: Joint) -> Choice:
-        """The same with the noise floor that a model shows."""
-        floor = floor_of(joint.likelihood, joint.fit, joint.fit.point.cost)
-        return replace(self, excess=self.excess + self.floor - floor, floor=floor)
-
-    def share(self, joint: Joint) -> float:
-        """Part of the excess that a model explains."""
-        return 1 - max(joint.fit.point.cost - self.floor, 0.0) / max(self.excess, 1e-9)
-
-    def remainder(self, joint: Joint) -> float:
-        """Excess of chi-square that a model leaves."""
-        return 2 * max(joint.fit.point.cost - self.floor, 0.0) / joint.likelihood.measurements
-
-    def explains(self, pair: Joint, first: Joint) -> bool:
-        """Whether what one effect leaves has a second cause.
-
-        What a wrong functional form leaves is explained in part by many effects and wholly by none; a second effect is
-        explained wholly by one.
-        """
-        return self.remainder(pair) < FORM_LEFT * self.remainder(first)
-
-    def good(self, unseen: HeldOut) -> list[Joint]:
-        """Models of one effect that may be named, the best first."""
-        good = [j for j in self.singles[:LEADERS] if self.nameable(j, unseen)]
-        return sorted(good, key=lambda j: -evidence(j, unseen))
-
-    def nameable(self, joint: Joint, unseen: HeldOut) -> bool:
-        """Whether a model explains the fitted episodes and predicts the others."""
-        share = unseen.share(joint)
-        predicts = share >= PREDICTS or (share >= FORM_SHARE and unseen.remainder(joint) < SMALL)
-        clear = self.share(joint) > CLEAR and self._alone(joint)
-        return self.enough(joint) and unseen.helps(joint) and (predicts or clear) and not joint.stands_in
-
-    def enough(self, joint: Joint) -> bool:
-        """Whether a model explains what there is to explain."""
-        share = self.share(joint)
-        form_only = share >= FORM_SHARE and self.remainder(joint) < SMALL
-        return share >= (ENOUGH if len(joint.added) == 1 else PAIR_ENOUGH) or form_only or self._alone(joint)
-
-    def _alone(self, joint: Joint) -> bool:
-        """Whether an effect leaves little, and any other of several leaves many times that: its form is not ours."""
-        others = [j for j in different(self.singles) if j.name != joint.name]
-        left = 1 - self.share(joint)
-        if len(joint.added) > 1 or len(others) < SEVERAL or left > LITTLE:
-            return False
-        return all(1 - self.share(other) > MANY_TIMES * left for other in others)
-
-
-def floor_of(likelihood: Likelihood, fit: Fit, reached: float) -> float:
-    """Cost that noise alone leaves, from a fit of cost `reached`: less what is still smooth in its residual."""
-    return reached - 0.5 * max(smooth_excess(likelihood, fit.point, fit.robust), 0.0) * likelihood.measurements
 
 
 def choose(
@@ -177,6 +80,8 @@ def choose(
         choice = _tried(choice, [[converge(other, slight)]], unseen)
     if not first and not choice.good(unseen):
         choice = _tried(choice, begun, unseen)
+    if not choice.good(unseen):
+        choice = _with_scatter(choice, space, unseen)
     if choice.good(unseen):
         return _concluded(choice, candidates, unseen)
     return _in_pairs(choice, space, candidates, unseen) if choice.singles else choice
@@ -188,6 +93,19 @@ def _tried(choice: Choice, more: Iterable[list[Joint]], unseen: HeldOut) -> Choi
         choice = choice.of(sorted([*models, *choice.singles], key=worth))
         if choice.good(unseen):
             break
+    return choice
+
+
+def _with_scatter(choice: Choice, space: Space, unseen: HeldOut) -> Choice:
+    """The same with what differs from episode to episode, where that explains and predicts what no law does.
+
+    It has no functional form that could be wrong: nothing is forgiven.
+    """
+    for candidate in scattered(space.simulator):
+        joint = fit_scattered(space, candidate, SLIGHT * choice.excess)
+        judged = choice.of([joint, *choice.singles])
+        if min(judged.share(joint), unseen.share(joint)) > PREDICTS and not follows_command(joint):
+            return judged
     return choice
 
 
@@ -290,11 +208,6 @@ def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOu
     needed = choice.share(pair) - choice.share(first) > NEEDED or choice.remainder(first) > SEEN
     predicts = unseen.beside(first).helps(pair)
     return replace(choice, two=predicts and needed and choice.explains(pair, first))
-
-
-def evidence(joint: Joint, unseen: HeldOut) -> float:
-    """Log evidence of all episodes: of the fitted ones, and of the others as they are predicted."""
-    return -worth(joint) - unseen.surprise(joint) / joint.likelihood.correlation_time
 
 
 def _one_of(pair: Joint, i: int, space: Space) -> Joint:

@@ -12,7 +12,8 @@ from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import Refined, polish
 from compass_ros.discovery.beginning import from_the_beginning
 from compass_ros.discovery.candidates import candidates
-from compass_ros.discovery.choose import Choice, choose
+from compass_ros.discovery.choice import Choice
+from compass_ros.discovery.choose import choose
 from compass_ros.discovery.finding import Discovery, Finding, not_evaluated
 from compass_ros.discovery.followed import followed
 from compass_ros.discovery.information import information
@@ -101,7 +102,7 @@ def _restarted(likelihood: Likelihood, fit: Fit, choice: Choice, simulator: Simu
         return None
     best = choice.pair or choice.singles[0]
     values = best.fit.point.values[: len(simulator.cell.parameters)]
-    start = Point(values, best.fit.point.launch, np.inf)
+    start = Point(values, best.fit.point.launch[:, : likelihood.inputs.shape[1]], np.inf)
     clearly = max(RESTARTED * choice.excess, 5.0)
     tolerance = 0.2 * clearly
     other = minimise(likelihood, start, fit.free, 8, fit.robust, tolerance, fresh=False)

@@ -12,13 +12,14 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import Refined, with_launches
 from compass_ros.calibration.residuals import covariance
-from compass_ros.discovery.choose import Choice
+from compass_ros.discovery.choice import Choice
 from compass_ros.discovery.formula import Proposal, propose
 from compass_ros.discovery.joint import Joint, from_second_start
 from compass_ros.discovery.maps import TableMap, residual_map
 from compass_ros.discovery.next_shot import next_experiment
 from compass_ros.discovery.null import Null
 from compass_ros.discovery.numerics import shift
+from compass_ros.discovery.scatter import spreads
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.unknown import whereabouts
 from compass_ros.discovery.unseen import HeldOut
@@ -213,13 +214,16 @@ class Finding:
     def _std(self, joint: Joint) -> Floats:
         """(P + Q,) standard deviations; the prior's where the recordings say nothing.
 
-        Those of effects hold what a finite time step does to them; the parameters are those of this simulator.
+        Those of effects hold what a finite time step does to them; the parameters are those of this simulator. That of
+        a scatter is what so few episodes tell of it.
         """
         std = joint.likelihood.prior_std.copy()
         free = joint.fit.free
         of_effects = free >= len(self.simulator.cell.parameters)
         variance = np.diag(covariance(joint.likelihood, joint.fit))[: len(free)]
         std[free] *= np.sqrt(variance + np.where(of_effects, shift(joint), 0.0) ** 2)
+        of_spreads = spreads(joint)
+        std[of_spreads] = joint.fit.point.values[of_spreads] / np.sqrt(2 * len(joint.likelihood.inputs))
         return std
 
     def _tried(self, choice: Choice, chosen: Joint | None) -> tuple[Tried, ...]:

@@ -66,11 +66,14 @@ def widened(simulator: Simulator, likelihood: Likelihood, added: Sequence[Attach
     quantities = [q for a in added for q in a.effect.quantities]
     mean = [0.0 if q.amplitude else q.start for q in quantities]
     std = [20 * q.scale if q.amplitude else (q.high - q.low) / 4 for q in quantities]
+    more = sum(a.effect.scattered for a in added)
     return wider, replace(
         likelihood,
         predict=wider.observe,
         predict_alike=wider.observe_alike,
         parameters=wider.parameters,
+        inputs=np.pad(likelihood.inputs, ((0, 0), (0, more))),
+        launch_std=np.pad(likelihood.launch_std, (0, more)),
         prior_mean=np.concatenate([likelihood.prior_mean, mean]),
         prior_std=np.concatenate([likelihood.prior_std, std]),
     )

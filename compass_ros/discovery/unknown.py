@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compass_ros.discovery.choose import Choice
+from compass_ros.discovery.choice import Choice
 from compass_ros.discovery.screen import Space
 from compass_ros.types import Channel, Floats, Phase, Region, Where
 

@@ -93,8 +93,8 @@ def surprise(unseen: Likelihood, fitted: Likelihood, fit: Fit) -> float:
 
     A model that is unsure what its parameters are may be wrong about an episode without being refuted by it: the
     residual has the covariance 1 + J C J', C that of the fitted parameters. Launches that the cell does not know are
-    as likely as the cell says, and the volume that they take, the same for every model, is left out. Outliers are
-    weighed down as in the fit.
+    as likely as the cell says, and the volume that they take, the same for every model, is left out; that of a scatter
+    which the model adds is not. Outliers are weighed down as in the fit.
     """
     judged = fitted.on(unseen)
     point = with_launches(judged, fit.point.values)
@@ -112,7 +112,9 @@ def surprise(unseen: Likelihood, fitted: Likelihood, fit: Fit) -> float:
         move = -np.linalg.solve(inner, jacobian.T @ (weight * residual) + away)
         left = residual + jacobian @ move
     loss = 0.5 * float(np.sum(robust_loss(left, ROBUST)))
-    volume = np.linalg.slogdet(inner)[1] - np.linalg.slogdet(inner[p:, p:])[1] - np.linalg.slogdet(precision)[1]
+    same = p + np.flatnonzero(np.tile(np.cumsum(random[random]) <= np.sum(unseen.launch_std > 0), len(judged.inputs)))
+    common = inner[np.ix_(same, same)]
+    volume = np.linalg.slogdet(inner)[1] - np.linalg.slogdet(common)[1] - np.linalg.slogdet(precision)[1]
     return loss + 0.5 * float((away + move) @ precision @ (away + move)) + 0.5 * float(volume)
 
 

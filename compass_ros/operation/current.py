@@ -87,7 +87,8 @@ def current(cell: Cell, version: Path | None = None, threads: int = 0) -> Curren
         return Current(Simulator(cell, threads=threads), values)
     fitted = read_effects(version / "effects.yaml").effects
     simulator = Simulator(cell, [one.attached for one in fitted], threads)
-    return Current(simulator, np.concatenate([values, *(np.array(one.values) for one in fitted)]))
+    expected = [np.zeros(1) if one.attached.effect.scattered else np.array(one.values) for one in fitted]
+    return Current(simulator, np.concatenate([values, *expected]))
 
 
 def _inside(cell: Cell, name: str, value: float) -> float:

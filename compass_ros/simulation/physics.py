@@ -22,6 +22,7 @@ STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS.value
 class Physics:
     """A cell with effects, asked for B rollouts at once: (B, P) values, (B, A) inputs.
 
+    The inputs may go on with one column for each scattered effect: the rollout's own number, instead of the value.
     Raises ConfigError where an effect acts on what the scene lacks.
     """
 
@@ -58,6 +59,10 @@ class Physics:
             out.append((attached, values[:, at : at + size]))
             at += size
         return out
+
+    def of_command(self, inputs: Floats) -> Floats:
+        """The part of the inputs that the cell knows."""
+        return inputs[:, : len(self.cell.input_names)]
 
     def context(self, attached: Attached, values: Floats) -> Context:
         """What the hooks of an effect are told."""
@@ -99,17 +104,21 @@ class Physics:
         """(B, s) states at simulated time 0."""
         nq, nv = self.model.nq, self.model.nv
         start = np.zeros((len(values), mujoco.mj_stateSize(self.model, STATE)))
-        start[:, 1 : 1 + nq], start[:, 1 + nq : 1 + nq + nv] = self.dynamics.start(self.of_cell(values), inputs)
+        start[:, 1 : 1 + nq], start[:, 1 + nq : 1 + nq + nv] = self.dynamics.start(
+            self.of_cell(values), self.of_command(inputs)
+        )
         return start
 
     def controls(self, values: Floats, inputs: Floats, steps: int) -> Floats | None:
         """(B, T, nu) controls as the arm follows them; None where nothing is actuated."""
         if not self.model.nu:
             return None
-        controls = self.dynamics.controls(self.of_cell(values), inputs, steps)
+        controls = self.dynamics.controls(self.of_cell(values), self.of_command(inputs), steps)
+        drawn = list(inputs[:, len(self.cell.input_names) :, None].transpose(1, 0, 2))
         for attached, numbers in self.of_effects(values):
             if attached.effect.controls is not None:
-                controls = attached.effect.controls(controls, numbers, self.context(attached, values))
+                own = drawn.pop(0) if attached.effect.scattered and drawn else numbers
+                controls = attached.effect.controls(controls, own, self.context(attached, values))
         return np.ascontiguousarray(controls)
 
     def duration(self, values: Floats, inputs: Floats, time_s: Floats) -> float:
@@ -117,13 +126,13 @@ class Physics:
         last = float(np.nanmax(time_s))
         effects = self.of_effects(values)
         ahead = sum(a.effect.ahead(numbers, last) for a, numbers in effects if a.effect.ahead is not None)
-        return float(np.nanmax(self.cell.simulated_time(inputs, time_s))) + ahead
+        return float(np.nanmax(self.cell.simulated_time(self.of_command(inputs), time_s))) + ahead
 
     def sensed(self, values: Floats, inputs: Floats, time_s: Floats, positions: Floats) -> Floats:
         """(B, F, C) what the tracker says of (B, T + 1, C) positions at (B, F) times [s]."""
 
         def perfect(time: Floats) -> Floats:
-            return interpolate(positions, self.time_step, self.cell.simulated_time(inputs, time))
+            return interpolate(positions, self.time_step, self.cell.simulated_time(self.of_command(inputs), time))
 
         sample: Sample = perfect
         for attached, numbers in self.of_effects(values):

@@ -120,10 +120,10 @@ class Replay:
     """A simulator asked about recorded episodes. Both functions are batched over pairs (values, episode)."""
 
     def __init__(self, simulator: Simulator, data: Recordings, launch: Floats | None = None) -> None:
-        """`launch`: (E, A) by how much each episode's true inputs differ from what was commanded or measured."""
+        """`launch`: (E, A) by how much each episode's true inputs (`Simulator.inputs`) differ from what was said."""
         self.simulator = simulator
         self.data = data
-        self.inputs = data.inputs if launch is None else data.inputs + launch
+        self.inputs = data.inputs if launch is None else simulator.inputs(data.inputs) + launch
 
     def predict(self, values: Floats, episode: Ints) -> Floats:
         """(B, F, C) what the tracker would have said at the recorded stamps, for (B, P) values and (B,) episodes."""

@@ -92,6 +92,15 @@ class Simulator:
         """(P,) defaults of the cell; effects absent."""
         return np.array([p.default for p in self.parameters])
 
+    def inputs(self, commanded: Floats) -> Floats:
+        """(E, A) inputs of the cell with a column of zeros for each scattered effect: an episode's own number of it."""
+        return np.pad(commanded, ((0, 0), (0, sum(a.effect.scattered for a in self.effects))))
+
+    def launch_std(self, values: Floats) -> Floats:
+        """(A,) standard deviation of each of these inputs around what was commanded, at (P,) values."""
+        own = [n[0, 0] for a, n in self.physics.of_effects(values[None]) if a.effect.scattered]
+        return np.append(self.cell.launch_std, own)
+
     @property
     def time_step(self) -> float:
         return self.physics.time_step

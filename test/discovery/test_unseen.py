@@ -12,7 +12,7 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import refine
 from compass_ros.cells import load
-from compass_ros.discovery.choose import Choice
+from compass_ros.discovery.choice import Choice
 from compass_ros.discovery.joint import Joint
 from compass_ros.discovery.unseen import HELD_OUT_SEEN, held_out, unexpected
 from compass_ros.pipeline import pose

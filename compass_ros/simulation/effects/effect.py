@@ -67,6 +67,9 @@ class Effect:
     """Whether small amplitudes add up; False: each direction of the amplitudes is a case of its own."""
     on: Literal["objects", "walls", "cell"] = "objects"
     """What it acts on: `objects` (all that are tracked, or some), `walls` (one fixed geom of the scene), `cell`."""
+    scattered: bool = False
+    """Whether its number is another one in each episode, by chance around zero: a rollout may be given its own as an
+    input beside the cell's (`Simulator.inputs`), and what a fit finds is the standard deviation."""
     limit: str = ""
     """Name of the simpler effect that it comes to at an end of its shapes' ranges; empty: none."""
 

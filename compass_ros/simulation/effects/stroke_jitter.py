@@ -1,7 +1,7 @@
 """Pushes that vary in speed from one episode to the next.
 
-u -> u (1 + deviation). What a rollout is given is the deviation of its own episode; the effect's size is the standard
-deviation over episodes. Source: random effect on the launch.
+u -> u (1 + deviation). What a rollout is given is the deviation of its own episode; the effect's size, which a fit
+finds, is the standard deviation over episodes. Source: random effect on the launch.
 """
 
 from __future__ import annotations
@@ -23,4 +23,5 @@ EFFECT = Effect(
     sentence="a scatter of the pushing speed",
     controls=_controls,
     on="cell",
+    scattered=True,
 )

@@ -1,0 +1,111 @@
+"""Fitted models side by side: what each explains, and which of them may be named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from compass_ros.calibration.least_squares import Fit
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.discovery.joint import Joint
+from compass_ros.discovery.remainder import smooth_excess
+from compass_ros.discovery.trials import different, worth
+from compass_ros.discovery.unseen import HeldOut
+
+ENOUGH = 0.93
+"""Share of the excess (cost above the noise floor) that a single effect must explain to be named alone."""
+PAIR_ENOUGH = 0.95
+"""The same for two effects."""
+SMALL = 0.12
+"""Excess of chi-square under which a remainder is put down to the effect's functional form..."""
+FORM_SHARE = 0.6
+"""...if the effect explains at least this share."""
+PREDICTS = 0.92
+"""Share of the held-out excess that what is named must remove, but for a SMALL remainder: less is another law's."""
+CLEAR = 0.95
+"""Share from which an effect whose rivals all leave MANY_TIMES as much is named though it predicts less than that: what
+its form gets wrong grows in episodes that were not fitted."""
+LITTLE, MANY_TIMES, SEVERAL = 0.12, 4.0, 2
+"""Share that an effect may leave where at least so many others, fitted as well, leave so many times as much."""
+FORM_LEFT = 0.25
+"""Part of what one effect leaves that a second may leave to be its cause."""
+LEADERS = 4
+"""Best fits that are continued, and of which one may be named."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Fitted models, the best first."""
+
+    singles: tuple[Joint, ...]
+    pair: Joint | None
+    excess: float
+    """Cost of the plain model above the noise floor."""
+    floor: float
+    """Cost that the noise alone leaves."""
+    two: bool = False
+    """The first single is enough, and the pair still explains what it leaves: there are two."""
+    equal: tuple[Joint, ...] = ()
+    """Where the first single is enough: others that explain the recordings as well."""
+
+    def of(self, singles: Sequence[Joint]) -> Choice:
+        """The same recordings with these models; shares are of what the best shows to be above the noise."""
+        best = min(singles, key=lambda j: j.fit.point.cost)
+        return replace(self.shown_by(best), singles=tuple(singles))
+
+    def shown_by(self, joint: Joint) -> Choice:
+        """The same with the noise floor that a model shows."""
+        floor = floor_of(joint.likelihood, joint.fit, joint.fit.point.cost)
+        return replace(self, excess=self.excess + self.floor - floor, floor=floor)
+
+    def share(self, joint: Joint) -> float:
+        """Part of the excess that a model explains."""
+        return 1 - max(joint.fit.point.cost - self.floor, 0.0) / max(self.excess, 1e-9)
+
+    def remainder(self, joint: Joint) -> float:
+        """Excess of chi-square that a model leaves."""
+        return 2 * max(joint.fit.point.cost - self.floor, 0.0) / joint.likelihood.measurements
+
+    def explains(self, pair: Joint, first: Joint) -> bool:
+        """Whether what one effect leaves has a second cause.
+
+        What a wrong functional form leaves is explained in part by many effects and wholly by none; a second effect is
+        explained wholly by one.
+        """
+        return self.remainder(pair) < FORM_LEFT * self.remainder(first)
+
+    def good(self, unseen: HeldOut) -> list[Joint]:
+        """Models of one effect that may be named, the best first."""
+        good = [j for j in self.singles[:LEADERS] if self.nameable(j, unseen)]
+        return sorted(good, key=lambda j: -evidence(j, unseen))
+
+    def nameable(self, joint: Joint, unseen: HeldOut) -> bool:
+        """Whether a model explains the fitted episodes and predicts the others."""
+        share = unseen.share(joint)
+        predicts = share >= PREDICTS or (share >= FORM_SHARE and unseen.remainder(joint) < SMALL)
+        clear = self.share(joint) > CLEAR and self._alone(joint)
+        return self.enough(joint) and unseen.helps(joint) and (predicts or clear) and not joint.stands_in
+
+    def enough(self, joint: Joint) -> bool:
+        """Whether a model explains what there is to explain."""
+        share = self.share(joint)
+        form_only = share >= FORM_SHARE and self.remainder(joint) < SMALL
+        return share >= (ENOUGH if len(joint.added) == 1 else PAIR_ENOUGH) or form_only or self._alone(joint)
+
+    def _alone(self, joint: Joint) -> bool:
+        """Whether an effect leaves little, and any other of several leaves many times that: its form is not ours."""
+        others = [j for j in different(self.singles) if j.name != joint.name]
+        left = 1 - self.share(joint)
+        if len(joint.added) > 1 or len(others) < SEVERAL or left > LITTLE:
+            return False
+        return all(1 - self.share(other) > MANY_TIMES * left for other in others)
+
+
+def evidence(joint: Joint, unseen: HeldOut) -> float:
+    """Log evidence of all episodes: of the fitted ones, and of the others as they are predicted."""
+    return -worth(joint) - unseen.surprise(joint) / joint.likelihood.correlation_time
+
+
+def floor_of(likelihood: Likelihood, fit: Fit, reached: float) -> float:
+    """Cost that noise alone leaves, from a fit of cost `reached`: less what is still smooth in its residual."""
+    return reached - 0.5 * max(smooth_excess(likelihood, fit.point, fit.robust), 0.0) * likelihood.measurements

@@ -1,0 +1,67 @@
+"""Pushes that differ by chance: deviations planted in each shot come back, with their spread."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.discovery.candidates import candidates, scattered
+from compass_ros.discovery.planned import perfect
+from compass_ros.discovery.scatter import fit_scattered, follows_command, spreads
+from compass_ros.discovery.unseen import held_out
+from compass_ros.simulation.effects import EFFECTS, Attached
+from compass_ros.types import Floats
+from test.discovery.planted import CALM, HELD_OUT, RATE, SIGMA, space_of
+from test.simulation.table import actions, cell, simulator, values
+
+JITTER = Attached(EFFECTS["stroke_jitter"], ())
+SHOTS = np.vstack([CALM, CALM * [1.0, 1.0, 0.9, 1.1]])
+DEVIATION = np.array([0.02, -0.03, 0.01, -0.01, 0.04, -0.02])
+
+
+def recorded(shots: Floats, deviation: Floats, seed: int = 0) -> Likelihood:
+    clean = perfect(simulator(), shots, RATE, SIGMA)
+    wider = simulator().with_effects([JITTER])
+    measured = wider.observe(np.hstack([values(count=len(shots)), deviation[:, None]]), shots, clean.time_s)
+    return replace(clean, measured=measured + np.random.default_rng(seed).normal(0, SIGMA, measured.shape))
+
+
+def test_a_rollout_has_the_deviation_that_its_input_says_whatever_the_spread() -> None:
+    wider, shots = simulator().with_effects([JITTER]), actions(3)
+    times = np.tile(np.linspace(0, 1, 20), (3, 1))
+    own = wider.inputs(shots) + np.array([0, 0, 0, 0, 1.0]) * np.array([[0.1], [0.0], [-0.2]])
+    for spread in (0.0, 0.05):
+        scattering = wider.observe(np.hstack([values(count=3), np.full((3, 1), spread)]), own, times)
+        for row, deviation in enumerate((0.1, 0.0, -0.2)):
+            alone = wider.observe(np.append(values()[0], deviation)[None], shots[row : row + 1], times[:1])
+            np.testing.assert_array_equal(scattering[row], alone[0])
+    assert wider.launch_std(np.append(values()[0], 0.05)) == pytest.approx([0, 0, 0, 0, 0.05])
+
+
+def test_deviations_and_their_spread_are_found_and_predict_other_shots() -> None:
+    space = space_of(recorded(SHOTS, DEVIATION))
+    joint = fit_scattered(space, scattered(simulator())[0], 1.0)
+    discount = cell().index("pusher@actuation@vel_discount")
+    mean = joint.fit.point.values[discount] / cell().defaults[discount]  # that of the deviations is the parameter's
+    speed = mean * (1 + joint.fit.point.launch[:, -1])
+    assert speed / np.mean(speed) == pytest.approx((1 + DEVIATION) / np.mean(1 + DEVIATION), abs=0.004)
+    (at,) = spreads(joint)
+    assert joint.fit.point.values[at] == pytest.approx(np.std(DEVIATION, ddof=1), rel=0.25)
+    assert 2 * joint.fit.point.cost < 1.1 * joint.likelihood.measurements
+    other = recorded(HELD_OUT, np.array([0.03, -0.02]), 1)
+    assert held_out(other, space.likelihood, space.fit).share(joint) > 0.9
+    assert not follows_command(joint)
+
+
+def test_deviations_that_a_speed_explains_are_no_scatter() -> None:
+    slower_when_fast = -0.3 * (SHOTS[:, 3] - np.mean(SHOTS[:, 3]))
+    joint = fit_scattered(space_of(recorded(SHOTS, slower_when_fast)), scattered(simulator())[0], 1.0)
+    assert follows_command(joint)
+
+
+def test_a_scatter_is_no_law() -> None:
+    assert "stroke_jitter" not in {c.name for c in candidates(simulator())}
+    assert [c.name for c in scattered(simulator())] == ["stroke_jitter"]
