@@ -10,7 +10,7 @@ import numpy as np
 from compass_ros.calibration.least_squares import Point, cost, minimise
 from compass_ros.discovery.beginning import begun
 from compass_ros.discovery.candidates import Candidate, scattered
-from compass_ros.discovery.choice import LEADERS, PREDICTS, Choice, evidence, floor_of
+from compass_ros.discovery.choice import CLEAR, LEADERS, Choice, evidence, floor_of
 from compass_ros.discovery.joint import Joint, converge, from_second_start, widened
 from compass_ros.discovery.scatter import fit_scattered, follows_command
 from compass_ros.discovery.screen import Score, Space
@@ -97,14 +97,14 @@ def _tried(choice: Choice, more: Iterable[list[Joint]], unseen: HeldOut) -> Choi
 
 
 def _with_scatter(choice: Choice, space: Space, unseen: HeldOut) -> Choice:
-    """The same with what differs from episode to episode, where that explains and predicts what no law does.
+    """The same with what differs from episode to episode by chance, where that explains what no law does.
 
-    It has no functional form that could be wrong: nothing is forgiven.
+    It has no functional form that could be wrong: it explains all or is not there.
     """
     for candidate in scattered(space.simulator):
         joint = fit_scattered(space, candidate, SLIGHT * choice.excess)
         judged = choice.of([joint, *choice.singles])
-        if min(judged.share(joint), unseen.share(joint)) > PREDICTS and not follows_command(joint):
+        if judged.share(joint) > CLEAR and not follows_command(joint):
             return judged
     return choice
 
