@@ -30,14 +30,14 @@ SLIGHT = 2.0
 def followed(likelihood: Likelihood, fit: Fit) -> tuple[Likelihood, Fit]:
     """The plain fit to what it can follow, in weights that say what that is; the same objects where it follows all."""
     weighted = likelihood
-    for _ in range(TURNS):
+    for turn in range(1, TURNS + 1):
         doubt = doubted(likelihood, residual_at(likelihood, fit.point))
         if np.all(doubt == 1.0):
             if weighted is not likelihood:  # the fit without some frames follows these too
                 fit = minimise(likelihood, fit.point, fit.free, 6, fit.robust, SLIGHT)
             return likelihood, fit
         weighted = replace(likelihood, sigma=likelihood.sigma * doubt[:, :, None])
-        fit = minimise(weighted, fit.point, fit.free, 6, fit.robust, SLIGHT)
+        fit = minimise(weighted, fit.point, fit.free, 6, fit.robust, SLIGHT, fresh=turn == TURNS)
     return weighted, fit
 
 

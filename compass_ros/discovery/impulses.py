@@ -67,16 +67,22 @@ def impulses(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> Impulses
     pushed = simulator.with_effects([*simulator.effects, *(Attached(_PUSH, (name,)) for name in movers)])
     known = len(fit.point.values)
     cases = [(k, n, a) for k in range(MOMENTS) for n in range(len(movers)) for a in range(2)]
-    values = np.tile(np.concatenate([fit.point.values, np.tile([0.0, 0.0, 0.0, half], len(movers))]), (len(cases), 1))
+    none = np.concatenate([fit.point.values, np.tile([0.0, 0.0, 0.0, half], len(movers))])
+    values = np.tile(none, (1 + len(cases), 1))
+    until = np.zeros(1 + len(cases))
     size = SPEED_CHANGE / half
-    for row, (k, n, a) in zip(values, cases, strict=True):
-        row[known + 4 * n + a] = size
-        row[known + 4 * n + 2] = moments[k]
+    for i, (k, n, a) in enumerate(cases, 1):
+        values[i, known + 4 * n + a] = size
+        values[i, known + 4 * n + 2] = moments[k]
+        until[i] = max(moments[k] - half, 0.0)
     inputs = likelihood.inputs + fit.point.launch
-    index = np.tile(np.arange(episodes), len(cases))
-    predicted = pushed.observe(np.repeat(values, episodes, axis=0), inputs[index], likelihood.time_s[index])
+    index = np.tile(np.arange(episodes), len(values))
+    predicted, _ = pushed.observe_alike(
+        np.repeat(values, episodes, axis=0), inputs[index], likelihood.time_s[index], index, np.repeat(until, episodes)
+    )
     there = np.nan_to_num((predicted - likelihood.measured[index]) / likelihood.sigma[index])
-    change = (there.reshape(len(cases), episodes, -1) - fit.linear.residual.reshape(episodes, -1)) / size
+    there = there.reshape(len(values), episodes, -1)
+    change = (there[1:] - there[0]) / size
     base = np.tile(fit.point.values, (episodes, 1))
     paths = simulator.paths(base, inputs, moments, movers)
     return Impulses(movers, moments, paths, simulator.masses(fit.point.values, movers), np.moveaxis(change, 0, -1))
