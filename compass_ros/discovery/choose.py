@@ -11,8 +11,8 @@ from compass_ros.calibration.least_squares import Point, cost, minimise
 from compass_ros.discovery.beginning import begun
 from compass_ros.discovery.candidates import Candidate, scattered
 from compass_ros.discovery.choice import CLEAR, LEADERS, Choice, evidence, floor_of
-from compass_ros.discovery.joint import Joint, converge, from_second_start, widened
-from compass_ros.discovery.scatter import fit_scattered, follows_command
+from compass_ros.discovery.joint import Joint, converge, finished, from_second_start, widened
+from compass_ros.discovery.scatter import fit_scattered, follows_command, settled_scatter
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import screen
 from compass_ros.discovery.trials import TRIED, at_other_rates, different, further, sketched, worth
@@ -91,6 +91,8 @@ def _tried(choice: Choice, more: Iterable[list[Joint]], unseen: HeldOut) -> Choi
     """The same with more models, until one is enough."""
     for models in more:
         choice = choice.of(sorted([*models, *choice.singles], key=worth))
+        ended = [finished(j) if j in models and choice.share(j) > LEADS else j for j in choice.singles]
+        choice = choice.of(sorted(ended, key=worth))
         if choice.good(unseen):
             break
     return choice
@@ -103,6 +105,9 @@ def _with_scatter(choice: Choice, space: Space, unseen: HeldOut) -> Choice:
     """
     for candidate in scattered(space.simulator):
         joint = fit_scattered(space, candidate, SLIGHT * choice.excess)
+        if choice.of([joint]).share(joint) < LEADS:
+            continue
+        joint = settled_scatter(joint)
         judged = choice.of([joint, *choice.singles])
         if judged.share(joint) > CLEAR and not follows_command(joint):
             return judged

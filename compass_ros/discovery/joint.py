@@ -124,10 +124,16 @@ def from_second_start(joint: Joint) -> Joint:
     values = joint.likelihood.prior_mean.copy()
     of_effects = np.arange(len(joint.simulator.cell.parameters), len(values))
     values[of_effects] = joint.fit.point.values[of_effects]
-    second = _refined(joint.simulator, joint.likelihood, joint.added, values, joint.fit.robust)
+    fit = _grown(joint.simulator, joint.likelihood, values, joint.fit.robust)
+    second = finished(replace(joint, fit=fit))
     if second.fit.point.cost > joint.fit.point.cost:
-        return replace(joint, fit=settled(joint.likelihood, joint.fit), converged=True, settled=True)
+        return finished(joint)
     return second
+
+
+def finished(joint: Joint) -> Joint:
+    """A fit at its optimum."""
+    return replace(joint, fit=settled(joint.likelihood, joint.fit), converged=True, settled=True)
 
 
 def from_first_guess(space: Space, attached: Attached, numbers: Floats) -> Joint:
@@ -144,24 +150,21 @@ def grown(joint: Joint, attached: Attached, simulator: Simulator, likelihood: Li
     Simulator and likelihood are those without the effect.
     """
     wider, whole = widened(simulator, likelihood, (attached,))
-    return _refined(wider, whole, (attached,), joint.fit.point.values, robust)
-
-
-def _refined(
-    simulator: Simulator, likelihood: Likelihood, added: tuple[Attached, ...], values: Floats, robust: float
-) -> Joint:
-    """A fit on a growing horizon to its optimum in the given weights, all that is felt free in the end."""
-    fit = _grown(simulator, likelihood, values, robust)
-    fit = settled(likelihood, replace(fit, robust=robust))
-    return Joint(simulator, likelihood, fit, added, converged=True, settled=True)
+    return Joint(wider, whole, _grown(wider, whole, joint.fit.point.values, robust), (attached,))
 
 
 def _grown(simulator: Simulator, likelihood: Likelihood, values: Floats, robust: float) -> Fit:
-    """A fit on a growing horizon, shapes as they are until it is whole, and then all that is felt free."""
+    """A fit on a growing horizon, shapes as they are until it is whole, and then all that is felt free.
+
+    The loss may have been wider on the way; in the end it is weighed by the one that is asked for.
+    """
     of_effects = np.arange(len(simulator.cell.parameters), len(values))
     shapes = [not q.amplitude for attached in simulator.effects for q in attached.effect.quantities]
     *_, (_, begun) = growing(likelihood, values, of_effects[shapes])
-    return freed(likelihood, begun.point, 5, robust, of_effects)[1]
+    fit = freed(likelihood, begun.point, 5, robust, of_effects)[1]
+    costs, residuals = cost(likelihood, [fit.point], robust)
+    point, linear = replace(fit.point, cost=float(costs[0])), replace(fit.linear, residual=residuals[0])
+    return replace(fit, point=point, linear=linear, robust=robust)
 
 
 def _scaled(score: Score, share: float) -> Floats:

@@ -29,7 +29,7 @@ BY_CHANCE = 0.01
 
 
 def fit_scattered(space: Space, scattered: Candidate, slight: float) -> Joint:
-    """Parameters, deviations and their spread, from the plain fit."""
+    """Some steps of parameters, deviations and their spread from the plain fit."""
     simulator, likelihood = widened(space.simulator, space.likelihood, (scattered.attached,))
     plain = space.fit
     spread = FIRST * scattered.attached.effect.quantities[0].scale
@@ -40,8 +40,13 @@ def fit_scattered(space: Space, scattered: Candidate, slight: float) -> Joint:
         fit = minimise(likelihood, point, plain.free, ITERATIONS, plain.robust, slight)
         point, spread = fit.point, found_spread(likelihood, fit)
     likelihood, point = _spread(likelihood, point, spread)
-    joint = from_second_start(Joint(simulator, likelihood, replace(fit, point=point), (scattered.attached,)))
-    likelihood, point = _spread(likelihood, joint.fit.point, found_spread(likelihood, joint.fit))
+    return Joint(simulator, likelihood, replace(fit, point=point), (scattered.attached,))
+
+
+def settled_scatter(joint: Joint) -> Joint:
+    """The same at its optimum, from two starts, and with the spread that is found there."""
+    joint = from_second_start(joint)
+    likelihood, point = _spread(joint.likelihood, joint.fit.point, found_spread(joint.likelihood, joint.fit))
     return replace(joint, likelihood=likelihood, fit=settled(likelihood, replace(joint.fit, point=point)))
 
 

@@ -10,7 +10,7 @@ import pytest
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.candidates import candidates, scattered
 from compass_ros.discovery.planned import perfect
-from compass_ros.discovery.scatter import fit_scattered, follows_command, spreads
+from compass_ros.discovery.scatter import fit_scattered, follows_command, settled_scatter, spreads
 from compass_ros.discovery.unseen import held_out
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.types import Floats
@@ -43,7 +43,7 @@ def test_a_rollout_has_the_deviation_that_its_input_says_whatever_the_spread() -
 
 def test_deviations_and_their_spread_are_found_and_predict_other_shots() -> None:
     space = space_of(recorded(SHOTS, DEVIATION))
-    joint = fit_scattered(space, scattered(simulator())[0], 1.0)
+    joint = settled_scatter(fit_scattered(space, scattered(simulator())[0], 1.0))
     discount = cell().index("pusher@actuation@vel_discount")
     mean = joint.fit.point.values[discount] / cell().defaults[discount]  # that of the deviations is the parameter's
     speed = mean * (1 + joint.fit.point.launch[:, -1])
