@@ -46,12 +46,12 @@ def choose(
     scores: Sequence[Score],
     candidates: Sequence[Candidate],
     unseen: HeldOut,
-    begun: Iterable[list[Joint]] = (),
+    beginnings: Iterable[list[Joint]] = (),
     first: bool = False,
 ) -> Choice:
     """Fit the promising candidates; where none is enough, others, and then the best of them with a second one.
 
-    `begun`: models that the beginnings of the episodes suggest, some at a time, each list fitted when it is asked for;
+    `beginnings`: models that the beginnings of the episodes suggest, some at a time, each list fitted when it is asked for;
     tried `first`, or where no other effect is enough.
     """
     base = float(cost(space.likelihood, [space.fit.point], space.fit.robust)[0][0])
@@ -59,7 +59,7 @@ def choose(
     choice = Choice((), None, base - floor, floor)
     slight = SLIGHT * choice.excess
     if first:
-        choice = _tried(choice, begun, unseen)
+        choice = _tried(choice, beginnings, unseen)
         if choice.good(unseen):
             return _concluded(choice, candidates, unseen)
     sketches = sketched(space, scores)
@@ -79,7 +79,7 @@ def choose(
     if other := at_other_rates(space, scores):
         choice = _tried(choice, [[converge(other, slight)]], unseen)
     if not first and not choice.good(unseen):
-        choice = _tried(choice, begun, unseen)
+        choice = _tried(choice, beginnings, unseen)
     if not choice.good(unseen):
         choice = _with_scatter(choice, space, unseen)
     if choice.good(unseen):
