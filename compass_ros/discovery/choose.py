@@ -51,8 +51,8 @@ def choose(
 ) -> Choice:
     """Fit the promising candidates; where none is enough, others, and then the best of them with a second one.
 
-    `beginnings`: models that the beginnings of the episodes suggest, some at a time, each list fitted when it is asked for;
-    tried `first`, or where no other effect is enough.
+    `beginnings`: models that the beginnings of the episodes suggest, some at a time, each list fitted when it is asked
+    for; tried `first`, or where no other effect is enough.
     """
     base = float(cost(space.likelihood, [space.fit.point], space.fit.robust)[0][0])
     floor = floor_of(space.likelihood, space.fit, base)
@@ -105,11 +105,11 @@ def _with_scatter(choice: Choice, space: Space, unseen: HeldOut) -> Choice:
     """
     for candidate in scattered(space.simulator):
         joint = fit_scattered(space, candidate, SLIGHT * choice.excess)
-        if choice.of([joint]).share(joint) < LEADS:
+        if choice.of([joint]).share(joint) < LEADS or follows_command(joint):
             continue
         joint = settled_scatter(joint)
         judged = choice.of([joint, *choice.singles])
-        if judged.share(joint) > CLEAR and not follows_command(joint):
+        if judged.share(joint) > CLEAR:
             return judged
     return choice
 

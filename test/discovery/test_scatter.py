@@ -7,11 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from compass_ros.calibration.least_squares import cost
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.candidates import candidates, scattered
+from compass_ros.discovery.choice import Choice, floor_of
+from compass_ros.discovery.choose import _with_scatter
 from compass_ros.discovery.planned import perfect
-from compass_ros.discovery.scatter import fit_scattered, follows_command, settled_scatter, spreads
-from compass_ros.discovery.unseen import held_out
+from compass_ros.discovery.scatter import spreads
+from compass_ros.discovery.unseen import HeldOut, held_out
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.types import Floats
 from test.discovery.planted import CALM, HELD_OUT, RATE, SIGMA, space_of
@@ -41,9 +44,20 @@ def test_a_rollout_has_the_deviation_that_its_input_says_whatever_the_spread() -
     assert wider.launch_std(np.append(values()[0], 0.05)) == pytest.approx([0, 0, 0, 0, 0.05])
 
 
+def tried(deviation: Floats) -> tuple[Choice, HeldOut]:
+    """What is said of shots with these deviations, and two more shots to judge it."""
+    space = space_of(recorded(SHOTS, deviation))
+    base = float(cost(space.likelihood, [space.fit.point], space.fit.robust)[0][0])
+    floor = floor_of(space.likelihood, space.fit, base)
+    unseen = held_out(recorded(HELD_OUT, np.array([0.03, -0.02]), 1), space.likelihood, space.fit)
+    return _with_scatter(Choice((), None, base - floor, floor), space, unseen), unseen
+
+
 def test_deviations_and_their_spread_are_found_and_predict_other_shots() -> None:
-    space = space_of(recorded(SHOTS, DEVIATION))
-    joint = settled_scatter(fit_scattered(space, scattered(simulator())[0], 1.0))
+    choice, unseen = tried(DEVIATION)
+    (joint,) = choice.good(unseen)
+    assert joint.name == "stroke_jitter"
+    assert unseen.share(joint) > 0.9
     discount = cell().index("pusher@actuation@vel_discount")
     mean = joint.fit.point.values[discount] / cell().defaults[discount]  # that of the deviations is the parameter's
     speed = mean * (1 + joint.fit.point.launch[:, -1])
@@ -51,15 +65,11 @@ def test_deviations_and_their_spread_are_found_and_predict_other_shots() -> None
     (at,) = spreads(joint)
     assert joint.fit.point.values[at] == pytest.approx(np.std(DEVIATION, ddof=1), rel=0.25)
     assert 2 * joint.fit.point.cost < 1.1 * joint.likelihood.measurements
-    other = recorded(HELD_OUT, np.array([0.03, -0.02]), 1)
-    assert held_out(other, space.likelihood, space.fit).share(joint) > 0.9
-    assert not follows_command(joint)
 
 
 def test_deviations_that_a_speed_explains_are_no_scatter() -> None:
-    slower_when_fast = -0.3 * (SHOTS[:, 3] - np.mean(SHOTS[:, 3]))
-    joint = fit_scattered(space_of(recorded(SHOTS, slower_when_fast)), scattered(simulator())[0], 1.0)
-    assert follows_command(joint)
+    choice, _ = tried(-0.3 * (SHOTS[:, 3] - np.mean(SHOTS[:, 3])))
+    assert not choice.singles
 
 
 def test_a_scatter_is_no_law() -> None:
