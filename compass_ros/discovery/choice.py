@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from compass_ros.calibration.least_squares import Fit
+from compass_ros.calibration.least_squares import Fit, cost
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.joint import Joint
 from compass_ros.discovery.remainder import smooth_excess
+from compass_ros.discovery.screen import Space
 from compass_ros.discovery.trials import different, worth
 from compass_ros.discovery.unseen import HeldOut
 
@@ -104,6 +105,13 @@ class Choice:
 def evidence(joint: Joint, unseen: HeldOut) -> float:
     """Log evidence of all episodes: of the fitted ones, and of the others as they are predicted."""
     return -worth(joint) - unseen.surprise(joint) / joint.likelihood.correlation_time
+
+
+def undecided(space: Space) -> Choice:
+    """The plain fit, before any effect was tried."""
+    base = float(cost(space.likelihood, [space.fit.point], space.fit.robust)[0][0])
+    floor = floor_of(space.likelihood, space.fit, base)
+    return Choice((), None, base - floor, floor)
 
 
 def floor_of(likelihood: Likelihood, fit: Fit, reached: float) -> float:

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Point, cost, minimise
+from compass_ros.calibration.least_squares import Point, minimise
 from compass_ros.discovery.beginning import begun
 from compass_ros.discovery.candidates import Candidate, scattered
-from compass_ros.discovery.choice import CLEAR, LEADERS, Choice, evidence, floor_of
+from compass_ros.discovery.choice import CLEAR, LEADERS, Choice, evidence, undecided
 from compass_ros.discovery.joint import Joint, converge, finished, from_second_start, widened
 from compass_ros.discovery.scatter import fit_scattered, follows_command, settled_scatter
 from compass_ros.discovery.screen import Score, Space
@@ -54,9 +54,7 @@ def choose(
     `beginnings`: models that the beginnings of the episodes suggest, some at a time, each list fitted when it is asked
     for; tried `first`, or where no other effect is enough.
     """
-    base = float(cost(space.likelihood, [space.fit.point], space.fit.robust)[0][0])
-    floor = floor_of(space.likelihood, space.fit, base)
-    choice = Choice((), None, base - floor, floor)
+    choice = undecided(space)
     slight = SLIGHT * choice.excess
     if first:
         choice = _tried(choice, beginnings, unseen)
@@ -101,7 +99,7 @@ def _tried(choice: Choice, more: Iterable[list[Joint]], unseen: HeldOut) -> Choi
 def _with_scatter(choice: Choice, space: Space, unseen: HeldOut) -> Choice:
     """The same with what differs from episode to episode by chance, where that explains what no law does.
 
-    It has no functional form that could be wrong: it explains all or is not there.
+    It has no functional form that could be wrong: it explains all or is not there. No pair is made of it.
     """
     for candidate in scattered(space.simulator):
         joint = fit_scattered(space, candidate, SLIGHT * choice.excess)
@@ -109,7 +107,7 @@ def _with_scatter(choice: Choice, space: Space, unseen: HeldOut) -> Choice:
             continue
         joint = settled_scatter(joint)
         judged = choice.of([joint, *choice.singles])
-        if judged.share(joint) > CLEAR:
+        if judged.share(joint) > CLEAR and judged.nameable(joint, unseen):
             return judged
     return choice
 

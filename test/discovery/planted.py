@@ -41,12 +41,13 @@ def recorded(effect: Attached | None, numbers: Sequence[float], shots: Floats = 
 
 
 def recorded_with(
-    effects: Sequence[Attached], numbers: Sequence[float], shots: Floats = CALM, seed: int = 0
+    effects: Sequence[Attached], numbers: Sequence[float] | Floats, shots: Floats = CALM, seed: int = 0
 ) -> Likelihood:
-    """The same with several; `numbers` are those of all in their order."""
+    """The same with several; `numbers` are those of all in their order, or (E, q) other ones in each shot."""
     clean = perfect(simulator(), shots, RATE, SIGMA)
     wider = simulator().with_effects(effects)
-    values = np.tile(np.concatenate([simulator().defaults, numbers]), (len(shots), 1))
+    of_effects = np.broadcast_to(numbers, (len(shots), np.shape(numbers)[-1]))
+    values = np.hstack([np.tile(simulator().defaults, (len(shots), 1)), of_effects])
     measured = wider.observe(values, shots, clean.time_s)
     return replace(clean, measured=measured + np.random.default_rng(seed).normal(0, SIGMA, measured.shape))
 

@@ -2,34 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from compass_ros.calibration.least_squares import cost
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.candidates import candidates, scattered
-from compass_ros.discovery.choice import Choice, floor_of
+from compass_ros.discovery.choice import Choice, undecided
 from compass_ros.discovery.choose import _with_scatter
-from compass_ros.discovery.planned import perfect
 from compass_ros.discovery.scatter import spreads
 from compass_ros.discovery.unseen import HeldOut, held_out
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.types import Floats
-from test.discovery.planted import CALM, HELD_OUT, RATE, SIGMA, space_of
+from test.discovery.planted import CALM, HELD_OUT, PUCKS, recorded_with, space_of
 from test.simulation.table import actions, cell, simulator, values
 
-JITTER = Attached(EFFECTS["stroke_jitter"], ())
+JITTER, SWIRL = Attached(EFFECTS["stroke_jitter"], ()), Attached(EFFECTS["swirl"], PUCKS)
 SHOTS = np.vstack([CALM, CALM * [1.0, 1.0, 0.9, 1.1]])
 DEVIATION = np.array([0.02, -0.03, 0.01, -0.01, 0.04, -0.02])
-
-
-def recorded(shots: Floats, deviation: Floats, seed: int = 0) -> Likelihood:
-    clean = perfect(simulator(), shots, RATE, SIGMA)
-    wider = simulator().with_effects([JITTER])
-    measured = wider.observe(np.hstack([values(count=len(shots)), deviation[:, None]]), shots, clean.time_s)
-    return replace(clean, measured=measured + np.random.default_rng(seed).normal(0, SIGMA, measured.shape))
 
 
 def test_a_rollout_has_the_deviation_that_its_input_says_whatever_the_spread() -> None:
@@ -44,13 +33,15 @@ def test_a_rollout_has_the_deviation_that_its_input_says_whatever_the_spread() -
     assert wider.launch_std(np.append(values()[0], 0.05)) == pytest.approx([0, 0, 0, 0, 0.05])
 
 
-def tried(deviation: Floats) -> tuple[Choice, HeldOut]:
-    """What is said of shots with these deviations, and two more shots to judge it."""
+def recorded(shots: Floats, deviation: Floats, seed: int = 0) -> Likelihood:
+    return recorded_with([JITTER], deviation[:, None], shots, seed)
+
+
+def tried(deviation: Floats, others: Likelihood | None = None) -> tuple[Choice, HeldOut]:
+    """What is said of shots with these deviations, judged by others; by default by two that scatter too."""
     space = space_of(recorded(SHOTS, deviation))
-    base = float(cost(space.likelihood, [space.fit.point], space.fit.robust)[0][0])
-    floor = floor_of(space.likelihood, space.fit, base)
-    unseen = held_out(recorded(HELD_OUT, np.array([0.03, -0.02]), 1), space.likelihood, space.fit)
-    return _with_scatter(Choice((), None, base - floor, floor), space, unseen), unseen
+    unseen = held_out(others or recorded(HELD_OUT, np.array([0.03, -0.02]), 1), space.likelihood, space.fit)
+    return _with_scatter(undecided(space), space, unseen), unseen
 
 
 def test_deviations_and_their_spread_are_found_and_predict_other_shots() -> None:
@@ -69,6 +60,11 @@ def test_deviations_and_their_spread_are_found_and_predict_other_shots() -> None
 
 def test_deviations_that_a_speed_explains_are_no_scatter() -> None:
     choice, _ = tried(-0.3 * (SHOTS[:, 3] - np.mean(SHOTS[:, 3])))
+    assert not choice.singles
+
+
+def test_a_scatter_that_does_not_predict_is_dropped_before_pairs_are_made() -> None:
+    choice, _ = tried(DEVIATION, recorded_with([SWIRL], [0.03, -0.05, 0.06, 0.1, 0.5], HELD_OUT, 1))
     assert not choice.singles
 
 
