@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, Point, normal_equations
+from compass_ros.calibration.least_squares import Fit, Linear, Point, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import integrated_correlation_time
 from compass_ros.types import Floats
@@ -54,3 +54,31 @@ def information_share(likelihood: Likelihood, fit: Fit) -> float:
     clipped = np.clip(residual, -fit.robust, fit.robust)
     repeated = integrated_correlation_time(clipped, ~np.isnan(likelihood.measured))
     return 1 / (max(likelihood.correlation_time, repeated) * max(_chi_square(residual, likelihood, fit), 1.0))
+
+
+def jackknife(likelihood: Likelihood, fit: Fit) -> Floats:
+    """(p, p) covariance of the free parameters as the episodes disagree on them, in the prior's standard deviations.
+
+    `covariance` believes that the formula is true and only the measurements are not. Where the formula is another than
+    nature's, each episode pulls its quantities elsewhere, and a fit without that episode shows it: the jackknife that
+    leaves out one group at a time (Tukey 1958), with whole episodes as groups. To first order, for no rollouts.
+    """
+    episodes, p = len(likelihood.inputs), len(fit.free)
+    parts = [_part_of(likelihood, fit, e) for e in range(episodes)]
+    hessian = np.eye(p) + np.sum([part for part, _ in parts], axis=0)
+    without = np.array([np.linalg.solve(hessian - part, pull) for part, pull in parts])
+    away = without - without.mean(axis=0)
+    return np.asarray((episodes - 1) / episodes * away.T @ away)
+
+
+def _part_of(likelihood: Likelihood, fit: Fit, episode: int) -> tuple[Floats, Floats]:
+    """(p, p) and (p,) one episode's part of the normal equations, its launch solved for; without the prior."""
+    own, p = np.array([episode]), len(fit.free)
+    alone = likelihood.of(own)
+    point = Point(fit.point.values, fit.point.launch[own], np.inf)
+    linear = Linear(*(part[own] for part in vars(fit.linear).values()))
+    hessian, gradient = normal_equations(alone, point, linear, fit.free, fit.robust)
+    prior = ((point.values - likelihood.prior_mean) / likelihood.prior_std)[fit.free]
+    carried = np.linalg.solve(hessian[p:, p:], hessian[p:, :p]).T
+    part = hessian[:p, :p] - np.eye(p) - carried @ hessian[p:, :p]
+    return part, gradient[:p] - prior - carried @ gradient[p:]

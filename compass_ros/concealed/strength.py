@@ -45,11 +45,9 @@ class Strength:
     change: Floats
     """(S, F, 4) [m]."""
     left: Floats
-    """(S, F, 4) what is left after the best parameters [m]."""
-
-    @property
-    def rms_m(self) -> float:
-        return rms(self.left)
+    """(S, F, 4) what is left after the best parameters [m], to first order: to compare laws with."""
+    rms_m: float
+    """Of what is left when the parameters really move."""
 
 
 def sized(ingredient: Ingredient, judge: Judge, target: float) -> Strength:
@@ -59,8 +57,8 @@ def sized(ingredient: Ingredient, judge: Judge, target: float) -> Strength:
     best: Strength | None = None
     for _ in range(_PLAYS):
         tried = replace(ingredient, size=size)
-        change = judge.change([tried])
-        found = Strength(tried, change, judge.absorber.left(change))
+        change, absorber = judge.change([tried]), judge.absorber
+        found = Strength(tried, change, absorber.left(change), rms(absorber.really_left(change)))
         if best is None or abs(found.rms_m - target) < abs(best.rms_m - target):
             best = found
         if abs(found.rms_m / target - 1) < _CLOSE or (found.rms_m < target and size >= ingredient.law.most):

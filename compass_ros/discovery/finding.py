@@ -11,7 +11,7 @@ import numpy as np
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import Refined, with_launches
-from compass_ros.calibration.residuals import covariance
+from compass_ros.calibration.residuals import covariance, jackknife
 from compass_ros.discovery.choice import Choice
 from compass_ros.discovery.formula import Proposal, propose
 from compass_ros.discovery.joint import Joint, from_second_start
@@ -214,13 +214,15 @@ class Finding:
     def _std(self, joint: Joint) -> Floats:
         """(P + Q,) standard deviations; the prior's where the recordings say nothing.
 
-        Those of effects hold what a finite time step does to them; the parameters are those of this simulator. That of
-        a scatter is what so few episodes tell of it.
+        An effect has the library's formula, which need not be nature's: what the episodes disagree on counts where it
+        is more than the noise. Those of effects also hold what a finite time step does to them; the parameters are
+        those of this simulator. That of a scatter is what so few episodes tell of it.
         """
         std = joint.likelihood.prior_std.copy()
         free = joint.fit.free
         of_effects = free >= len(self.simulator.cell.parameters)
-        variance = np.diag(covariance(joint.likelihood, joint.fit))[: len(free)]
+        of_noise = np.diag(covariance(joint.likelihood, joint.fit))[: len(free)]
+        variance = np.maximum(of_noise, np.diag(jackknife(joint.likelihood, joint.fit)))
         std[free] *= np.sqrt(variance + np.where(of_effects, shift(joint), 0.0) ** 2)
         of_spreads = spreads(joint)
         std[of_spreads] = joint.fit.point.values[of_spreads] / np.sqrt(2 * len(joint.likelihood.inputs))
