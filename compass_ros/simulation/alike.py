@@ -34,15 +34,15 @@ def roll_alike(
     states = np.concatenate([start[models, None], play(models, start[models], 0)], axis=1)
     same = np.full(len(start), steps)
     out = np.empty((len(start), steps + 1, len(columns)))
-    out[models] = states[:, :, columns]
+    seen = states[:, :, columns]
+    out[models] = seen
 
     def branch_off(rows: Ints, step: int) -> Ints:
         """Roll out from that step on. Returns the rows that had begun to differ before."""
         of = np.searchsorted(models, like[rows])
         begin = states[of, step] if step else start[rows]
         after = play(rows, begin, step)
-        out[rows, :step] = states[of, :step][:, :, columns]
-        out[rows, step] = begin[:, columns]
+        out[rows, :step], out[rows, step] = seen[of, :step], begin[:, columns]
         out[rows, step + 1 :] = after[:, :, columns]
         equal = (after[:, STRIDE - 1 :: STRIDE] == states[of, step + STRIDE :: STRIDE]).all(axis=2)
         until_then = step + STRIDE * np.logical_and.accumulate(equal, axis=1).sum(axis=1)

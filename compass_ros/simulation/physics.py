@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -128,11 +129,12 @@ class Physics:
         ahead = sum(a.effect.ahead(numbers, last) for a, numbers in effects if a.effect.ahead is not None)
         return float(np.nanmax(self.cell.simulated_time(self.of_command(inputs), time_s))) + ahead
 
-    def sensed(self, values: Floats, inputs: Floats, time_s: Floats, positions: Floats) -> Floats:
-        """(B, F, C) what the tracker says of (B, T + 1, C) positions at (B, F) times [s]."""
+    def sensed(self, values: Floats, inputs: Floats, time_s: Floats, states: Floats) -> Floats:
+        """(B, F, C) what the tracker says at (B, F) times [s]; (B, T + 1, C) raw columns of the states."""
+        observe = partial(self.dynamics.observe, self.of_cell(values))
 
         def perfect(time: Floats) -> Floats:
-            return interpolate(positions, self.time_step, self.cell.simulated_time(self.of_command(inputs), time))
+            return interpolate(states, self.time_step, self.cell.simulated_time(self.of_command(inputs), time), observe)
 
         sample: Sample = perfect
         for attached, numbers in self.of_effects(values):
@@ -141,10 +143,15 @@ class Physics:
         return np.asarray(sample(time_s))
 
 
-def interpolate(positions: Floats, time_step: float, time_s: Floats) -> Floats:
-    """(B, F, C) linear interpolation of (B, T, C) rows at (B, F) times; before the start and after the end it holds."""
-    at = np.clip(np.nan_to_num(time_s) / time_step, 0, positions.shape[1] - 1)
-    low = np.minimum(at.astype(int), positions.shape[1] - 2)
+def interpolate(
+    rows: Floats, time_step: float, time_s: Floats, of_rows: Callable[[Floats], Floats] = np.asarray
+) -> Floats:
+    """(B, F, C) linear interpolation at (B, F) times of what `of_rows` makes of (B, T, C) rows, each for itself.
+
+    Before the start and after the end it holds.
+    """
+    at = np.clip(np.nan_to_num(time_s) / time_step, 0, rows.shape[1] - 1)
+    low = np.minimum(at.astype(int), rows.shape[1] - 2)
     share = (at - low)[:, :, None]
-    rows = np.arange(len(positions))[:, None]
-    return np.asarray((1 - share) * positions[rows, low] + share * positions[rows, low + 1])
+    of = np.arange(len(rows))[:, None]
+    return np.asarray((1 - share) * of_rows(rows[of, low]) + share * of_rows(rows[of, low + 1]))

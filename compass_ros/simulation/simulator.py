@@ -232,8 +232,8 @@ class Simulator:
         start, controls = self.physics.start(values, inputs), self.physics.controls(values, inputs, steps)
         known = np.minimum(until / self.time_step, steps).astype(int)
         if controls is not None:
-            commanded = (controls != controls[like]).any(axis=2)
-            known = np.minimum(known, np.where(commanded.any(axis=1), commanded.argmax(axis=1), steps))
+            other = (controls != controls[like]).reshape(len(controls), -1)
+            known = np.minimum(known, np.where(other.any(axis=1), other.argmax(axis=1) // controls.shape[2], steps))
         known[(start != start[like]).any(axis=1)] = 0
 
         def play(rows: Ints, begin: Floats, step: int) -> Floats:
@@ -242,12 +242,12 @@ class Simulator:
 
         columns = 1 + self.physics.dynamics.columns()
         states, same = roll_alike(play, start, steps, columns, like, known, CHUNK)
-        positions = self.physics.dynamics.observe(self.physics.of_cell(values), states)
-        return self.physics.sensed(values, inputs, time_s, positions), same * self.time_step
+        return self.physics.sensed(values, inputs, time_s, states), same * self.time_step
 
     def _observe_chunk(self, values: Floats, inputs: Floats, time_s: Floats) -> Floats:
-        positions = self._chunk(values, inputs, self.physics.duration(values, inputs, time_s))
-        return self.physics.sensed(values, inputs, time_s, positions)
+        duration = self.physics.duration(values, inputs, time_s)
+        states = self._roll(values, inputs, duration, self.physics.dynamics.columns())
+        return self.physics.sensed(values, inputs, time_s, states)
 
     def _chunk(self, values: Floats, inputs: Floats, duration: float) -> Floats:
         return self.physics.dynamics.observe(
