@@ -222,7 +222,8 @@ class Finding:
         free = joint.fit.free
         of_effects = free >= len(self.simulator.cell.parameters)
         of_noise = np.diag(covariance(joint.likelihood, joint.fit))[: len(free)]
-        variance = np.maximum(of_noise, np.diag(jackknife(joint.likelihood, joint.fit)))
+        of_episodes = np.minimum(np.diag(jackknife(joint.likelihood, joint.fit)), 1.0)  # the prior's at most
+        variance = np.maximum(of_noise, of_episodes)
         std[free] *= np.sqrt(variance + np.where(of_effects, shift(joint), 0.0) ** 2)
         of_spreads = spreads(joint)
         std[of_spreads] = joint.fit.point.values[of_spreads] / np.sqrt(2 * len(joint.likelihood.inputs))
