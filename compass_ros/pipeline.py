@@ -11,7 +11,7 @@ from importlib.metadata import version
 
 import numpy as np
 
-from compass_ros.calibration.causal_map import causal_map_refined
+from compass_ros.calibration.causal_map import IDENTIFIED, causal_map_refined
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.methods import compass_config, method
 from compass_ros.calibration.noise import Noise, measure_noise
@@ -168,7 +168,10 @@ def assemble(
 ) -> Result:
     """Gaps on all episodes for each model, tables and drawings."""
     values = found.parameters if found.parameters is not None else estimate.values
-    std = found.std if found.std is not None else estimate.std
+    std, identifiable = estimate.std, estimate.identifiable
+    if found.std is not None:  # beside an effect a parameter can be less sure than it was alone
+        std = found.std
+        identifiable = identifiable & (std < IDENTIFIED * np.array([p.half_width for p in cell.parameters]))
     models = {"nominal": (simulator, simulator.defaults), "calibrated": (simulator, estimate.values)}
     if found.simulator is not None and found.values is not None:
         models["with_effects"] = (found.simulator, found.values)
@@ -185,7 +188,7 @@ def assemble(
     )
     rows = tuple(
         ParameterRow(p.name, p.unit, p.default, float(v), float(s), (p.low, p.high), bool(a), bool(i))
-        for p, v, s, a, i in zip(cell.parameters, values, std, graph.active(), estimate.identifiable, strict=True)
+        for p, v, s, a, i in zip(cell.parameters, values, std, graph.active(), identifiable, strict=True)
     )
     drawn = _draw(cell, data, {n: (r[0], r[2]) for n, r in replays.items()}, held_out=False)
     if held_out:

@@ -10,11 +10,12 @@ import pytest
 from compass_ros.calibration.noise import Noise, measure_noise
 from compass_ros.cells import load
 from compass_ros.config import CalibrationConfig
+from compass_ros.discovery import Discovery, not_evaluated
 from compass_ros.errors import DataError
-from compass_ros.pipeline import calibrate, evenly, launched, noise_floor, split
+from compass_ros.pipeline import assemble, calibrate, evenly, launched, noise_floor, split
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import Replay, recordings
-from compass_ros.types import Episode, Progress, Result, Track
+from compass_ros.types import Episode, Estimate, Progress, Result, Track
 from test.simulation.table import actions, cell, simulator, values
 
 START = 1_700_000_000_000_000_000
@@ -156,6 +157,25 @@ def test_a_stop_is_said(episodes: list[Episode]) -> None:
         return False
 
     assert calibrate(episodes, cell(), CONFIG, stop)[0].cancelled
+
+
+def test_what_an_effect_makes_unsure_is_not_called_identifiable(episodes: list[Episode]) -> None:
+    own, alone = cell(), simulator()
+    half = np.array([p.half_width for p in own.parameters])
+    sure = np.ones(len(half), dtype=bool)
+    estimate = Estimate("causal-map", own.defaults, 0.01 * half, sure, None, (), 0, True, "done")
+    beside = not_evaluated("nobody asked")
+    unsure = np.where(np.arange(len(half)) == 3, 0.6, 0.1) * half
+    data = recordings(own, episodes[:2])
+    noise = measure_noise(data.time_s, data.measured, own.spec.noise_m)
+
+    def identifiable(found: Discovery) -> list[bool]:
+        result = assemble(own, CONFIG, alone, data, data, False, noise, estimate, found)
+        return [row.identifiable for row in result.parameters]
+
+    assert all(identifiable(beside))
+    beside = replace(beside, parameters=own.defaults, std=unsure)
+    assert identifiable(beside) == (np.arange(len(half)) != 3).tolist()
 
 
 def test_the_floor_is_of_positions_as_the_error_is() -> None:
