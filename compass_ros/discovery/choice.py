@@ -28,6 +28,8 @@ CLEAR = 0.95
 its form gets wrong grows in episodes that were not fitted."""
 LITTLE, MANY_TIMES, SEVERAL = 0.12, 4.0, 2
 """Share that an effect may leave where at least so many others, fitted as well, leave so many times as much."""
+OF_LIMIT = 8.0
+"""Log evidence by which an effect must surpass what it comes to at an end of its shapes."""
 FORM_LEFT = 0.25
 """Part of what one effect leaves that a second may leave to be its cause."""
 LEADERS = 4
@@ -94,12 +96,20 @@ class Choice:
         return share >= (ENOUGH if len(joint.added) == 1 else PAIR_ENOUGH) or form_only or self._alone(joint)
 
     def _alone(self, joint: Joint) -> bool:
-        """Whether an effect leaves little, and any other of several leaves many times that: its form is not ours."""
-        others = [j for j in different(self.singles) if j.name != joint.name]
+        """Whether an effect leaves little, and any other of several leaves many times that: its form is not ours.
+
+        One that comes to it at an end of its shapes is no other.
+        """
+        others = [j for j in different(self.singles) if j.name != joint.name and not comes_to(j, joint)]
         left = 1 - self.share(joint)
         if len(joint.added) > 1 or len(others) < SEVERAL or left > LITTLE:
             return False
         return all(1 - self.share(other) > MANY_TIMES * left for other in others)
+
+
+def comes_to(joint: Joint, simpler: Joint) -> bool:
+    """Whether a model says no more than a simpler one that it comes to at an end of its shapes."""
+    return joint.added[0].effect.limit == simpler.name and worth(simpler) - worth(joint) < OF_LIMIT
 
 
 def evidence(joint: Joint, unseen: HeldOut) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from compass_ros.calibration.least_squares import Point, minimise
 from compass_ros.discovery.beginning import begun
 from compass_ros.discovery.candidates import Candidate, scattered
-from compass_ros.discovery.choice import CLEAR, LEADERS, Choice, evidence, undecided
+from compass_ros.discovery.choice import CLEAR, LEADERS, OF_LIMIT, Choice, comes_to, evidence, undecided
 from compass_ros.discovery.joint import Joint, converge, finished, from_second_start, widened
 from compass_ros.discovery.scatter import fit_scattered, follows_command, settled_scatter
 from compass_ros.discovery.screen import Score, Space
@@ -27,8 +27,6 @@ EQUAL_SHARE = 0.015
 NEEDED, SEEN = 0.05, 0.04
 """Share of the excess that an effect must be worth beside another that is enough; or the excess of chi-square that the
 other leaves."""
-OF_LIMIT = 8.0
-"""Log evidence by which an effect must surpass what it comes to at an end of its shapes."""
 LEADS = 0.6
 """Share from which the best effect is surely one of two; below, the second best may be instead."""
 NEARLY = 0.85
@@ -192,10 +190,7 @@ def _equals(best: Joint, choice: Choice, unseen: HeldOut) -> tuple[Joint, ...]:
 
 def simplest(good: Sequence[Joint]) -> Joint:
     """The best, or what it comes to at an end of its shapes where that explains as much."""
-    best = good[0]
-    limit = best.added[0].effect.limit
-    plain = next((j for j in good if j.name == limit), None)
-    return plain if plain is not None and worth(plain) - worth(best) < OF_LIMIT else best
+    return next((j for j in good if comes_to(good[0], j)), good[0])
 
 
 def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:

@@ -13,6 +13,7 @@ from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import refine
 from compass_ros.cells import load
 from compass_ros.discovery.choice import Choice
+from compass_ros.discovery.choose import simplest
 from compass_ros.discovery.joint import Joint
 from compass_ros.discovery.unseen import HELD_OUT_SEEN, held_out, unexpected
 from compass_ros.pipeline import pose
@@ -49,6 +50,22 @@ def test_what_predicts_only_a_part_helps_and_is_not_named() -> None:
     weak, strong = (tuple(costing(joint(space, rival, [0.01]), left) for rival in RIVALS) for left in (900.0, 100.0))
     assert replace(choice, singles=(half, *weak)).nameable(half, unseen), "no other one explains much"
     assert not replace(choice, singles=(half, *strong)).nameable(half, unseen), "others leave 100, it leaves 30"
+
+
+def test_a_wind_so_fast_that_it_is_a_tilt_is_no_rival_of_the_tilt() -> None:
+    tilt, wind = Attached(EFFECTS["table_tilt"], PUCKS), Attached(EFFECTS["crosswind"], PUCKS)
+    space = space_of(recorded(tilt, [1e-3, -2e-3]))
+    unseen = held_out(recorded(tilt, [1e-3, -2e-3], HELD_OUT, 1), space.likelihood, space.fit)
+    half = costing(joint(space, tilt, [5e-4, -1e-3]), 30.0)
+    weak = tuple(costing(joint(space, rival, [0.01]), 900.0) for rival in RIVALS)
+    same, better = (costing(joint(space, wind, [5e-3, -1e-2, 3.0]), left) for left in (29.0, 5.0))
+    choice = Choice((half, *weak), None, excess=1000.0, floor=0.0)
+    assert 0.4 < unseen.share(half) < 0.92
+    assert choice.nameable(half, unseen)
+    assert replace(choice, singles=(same, half, *weak)).nameable(half, unseen)
+    assert simplest([same, half]) is half
+    assert not replace(choice, singles=(better, half, *weak)).nameable(half, unseen), "the wind explains more"
+    assert simplest([better, half]) is better
 
 
 def costing(fitted: Joint, cost: float) -> Joint:
