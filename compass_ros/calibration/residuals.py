@@ -73,11 +73,10 @@ def jackknife(likelihood: Likelihood, fit: Fit) -> Floats:
 
 def _part_of(likelihood: Likelihood, fit: Fit, episode: int) -> tuple[Floats, Floats]:
     """(p, p) and (p,) one episode's part of the normal equations, its launch solved for; without the prior."""
-    own, p = np.array([episode]), len(fit.free)
-    alone = likelihood.of(own)
+    own, p, known = np.array([episode]), len(fit.free), fit.linear
     point = Point(fit.point.values, fit.point.launch[own], np.inf)
-    linear = Linear(*(part[own] for part in vars(fit.linear).values()))
-    hessian, gradient = normal_equations(alone, point, linear, fit.free, fit.robust)
+    linear = Linear(known.residual[own], known.jacobian[own], known.launch_jacobian[own], known.onset[own])
+    hessian, gradient = normal_equations(likelihood.of(own), point, linear, fit.free, fit.robust)
     prior = ((point.values - likelihood.prior_mean) / likelihood.prior_std)[fit.free]
     carried = np.linalg.solve(hessian[p:, p:], hessian[p:, :p]).T
     part = hessian[:p, :p] - np.eye(p) - carried @ hessian[p:, :p]

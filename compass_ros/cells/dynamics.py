@@ -53,7 +53,7 @@ class Dynamics(Protocol):
         ...
 
     def observe(self, values: Floats, positions: Floats) -> Floats:
-        """(B, F, C) what the tracker would say, from (B, F, C) raw columns."""
+        """(B, F, C) what the tracker would say, from (B, F, C) raw columns, each moment for itself."""
         ...
 
     def poses(self, values: Floats, positions: Floats) -> Mapping[str, Floats]:

@@ -27,7 +27,6 @@ STRONG = (
 )
 """Parameters that move the pucks by 0.3 mm rms or more within their randomisation half-width."""
 _ROUNDS = 6
-_SIDES = ("low", "high")
 _SHARES = (1.0, 0.4)
 """Of a step along the tangents."""
 _WORTH = 0.98
@@ -82,8 +81,8 @@ class Absorber:
         """The same with parameters that really move, round by round; what is left to first order where that is less."""
         which = [self._cell.index(name) for name in STRONG]
         parameters = [self._cell.parameters[i] for i in which]
-        half = np.array([p.half_width for p in parameters])
-        low, high = ((np.array([getattr(p, side) for p in parameters]) - self._values[which]) / half for side in _SIDES)
+        half, low, high = np.array([(p.half_width, p.low, p.high) for p in parameters]).T
+        low, high = (low - self._values[which]) / half, (high - self._values[which]) / half
 
         def missed(moved: Floats) -> Floats:
             values = self._values.copy()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from compass_ros.calibration.least_squares import Fit, minimise, normal_equations, start
@@ -30,8 +32,7 @@ def recorded(inputs: Floats, seed: int) -> Likelihood:
     time = np.tile(np.linspace(0, 1, 40), (len(inputs), 1))
     clean = curved(np.empty(0), inputs, time)
     noisy = clean + np.random.default_rng(seed).normal(0, 0.01, clean.shape)
-    given = likelihood(linear, TRUTH, inputs)
-    return Likelihood(**(vars(given) | {"measured": noisy}))
+    return replace(likelihood(linear, TRUTH, inputs), measured=noisy)
 
 
 def test_to_leave_out_an_episode_is_to_fit_the_others() -> None:

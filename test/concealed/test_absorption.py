@@ -15,9 +15,8 @@ def test_what_other_parameters_do_is_swallowed_when_they_really_move() -> None:
     absorber = Absorber(own, own.defaults, INPUTS, TIMES[0])
     names = ("pusher@actuation@vel_discount", "puck1@dyna@friction_sliding", "puck2@dyna@friction_sliding")
     moved = own.defaults.copy()
-    for name, half_widths in zip(names, (-0.1, -0.1, -0.1), strict=True):
-        index = own.index(name)
-        moved[index] += half_widths * own.parameters[index].half_width
+    for index in map(own.index, names):
+        moved[index] -= 0.1 * own.parameters[index].half_width
     played = Simulator(own, threads=1).observe(np.tile(moved, (len(INPUTS), 1)), INPUTS, TIMES)
     change = played - absorber.plain
     first, really = rms(absorber.left(change)), rms(absorber.really_left(change))
