@@ -50,6 +50,9 @@ def test_what_predicts_only_a_part_helps_and_is_not_named() -> None:
     weak, strong = (tuple(costing(joint(space, rival, [0.01]), left) for rival in RIVALS) for left in (900.0, 100.0))
     assert replace(choice, singles=(half, *weak)).nameable(half, unseen), "no other one explains much"
     assert not replace(choice, singles=(half, *strong)).nameable(half, unseen), "others leave 100, it leaves 30"
+    foretells = costing(joint(space, RIVALS[1], [0.5]), 900.0)
+    assert unseen.share(foretells) > unseen.share(half)
+    assert not replace(choice, singles=(half, weak[0], foretells)).nameable(half, unseen), "another predicts more"
 
 
 def test_a_wind_so_fast_that_it_is_a_tilt_is_no_rival_of_the_tilt() -> None:
