@@ -163,6 +163,14 @@ def test_rows_look_at_their_own_worlds() -> None:
     assert rows["calibration and discovery, median [s]"].value == "60"
 
 
+def test_an_effect_that_parameters_absorb_is_not_asked_for() -> None:
+    strong, weak = ({"effects": [{"rms_m": 2e-3}, {"rms_m": rms_m}]} for rms_m in (1.2e-3, 4e-4))
+    found = [line | effects for line, effects in zip(worlds({}, {}), (strong, weak), strict=True)]
+    assert table(found)[0].count == "1 of 1"
+    assert (table(found)[-1].value, table(found)[-1].count) == ("1", "2")
+    assert table([line | {"suite": "small"} for line in found])[0].count == "2 of 2"
+
+
 def test_no_worlds_make_no_claims() -> None:
     assert all(row.reached is None for row in table([]))
 
