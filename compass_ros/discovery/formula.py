@@ -219,7 +219,8 @@ def propose(space: Space, held_out: Likelihood, iterations: int = 12) -> Proposa
 def _proposal(formula: Formula, joint: Joint, gain: float) -> Proposal:
     fitted = replace(formula, coefficients=joint.fit.point.values[-len(formula.terms) :])
     objects = " and ".join(formula.score.candidate.attached.objects)
-    sentence = f"A formula is proposed for {objects}, not named: {fitted.text} (SI; held-out excess -{gain:.0%})."
+    removed = f"removes {100 * gain:.0f} % of the held-out excess"
+    sentence = f"a formula is proposed for {objects}, not named: {fitted.text} (SI), which {removed}."
     return Proposal(fitted, joint, gain, sentence)
 
 

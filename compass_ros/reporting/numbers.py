@@ -10,10 +10,13 @@ NARROW = "\N{NARROW NO-BREAK SPACE}"
 
 
 def plain(value: float, digits: int = 4) -> str:
-    """`value` with `digits` significant digits; a dash when it is not finite."""
+    """`value` with `digits` significant digits, below a million without an exponent; a dash when it is not finite."""
     if not math.isfinite(value):
         return MISSING
-    return f"{value:.{digits}g}".replace("-", MINUS)
+    text = f"{value:.{digits}g}"
+    if "e+" in text and abs(float(text)) < 1e6:
+        text = f"{float(text):.0f}"
+    return text.replace("-", MINUS)
 
 
 def with_error(value: float, std: float) -> tuple[str, str]:

@@ -49,5 +49,9 @@ def test_typeset() -> None:
     assert typeset("0.21 +- 0.01 m/s2, 5 -> 1 mm") == "0.21 ± 0.01 m/s², 5 → 1 mm"
 
 
+def test_plain_writes_thousands_out() -> None:
+    assert [plain(x, 3) for x in (4794.0, -117.2, 4e3, 9.996e5)] == ["4790", f"{MINUS}117", "4000", "1e+06"]
+
+
 def test_plain_has_a_true_minus() -> None:
     assert plain(-0.5) == f"{MINUS}0.5"

@@ -14,9 +14,9 @@ from compass_ros.concealed.proof.lines import Line
 _LEVEL = 0.95
 _CENTRE_M = 0.02
 _APART_M = 1e-3
-_LEAST_M = {"small": 0.0}
-"""What the parameters must leave of each effect, rms, for a world to be judged [m]; in other suites 1 mm. Where a law's
-bounds end before, it is weaker than it was asked to be."""
+_FELT_M = 1e-3
+"""What the parameters must leave of each effect, rms, for a world to be judged [m], except in the suite `small`. Where a
+law's bounds end before, it is weaker than it was asked to be."""
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,7 @@ def _kind(line: Line) -> str:
 
 
 def _felt(line: Line) -> bool:
-    least = _LEAST_M.get(str(line.get("suite")), 1e-3)
-    return all(effect["rms_m"] >= least for effect in line.get("effects") or ())
+    return line["suite"] == "small" or all(effect["rms_m"] >= _FELT_M for effect in line.get("effects") or ())
 
 
 def _share(what: str, among: Sequence[Line], mark: str, bar: float, most: bool = False) -> Row:
