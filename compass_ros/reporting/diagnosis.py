@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from compass_ros.reporting.checks import SUMMARY, assess, overall
@@ -76,7 +76,8 @@ def _effect(finding: EffectFinding) -> Table:
 
 
 def _candidates(result: Result, extras: ReportExtras) -> Table:
-    table = Table("candidate", "channel", "log evidence", "held-out gain", "", title="Tried", title_justify="left")
+    name, others = Column("candidate", no_wrap=True), ("channel", "log evidence", "held-out gain", "")
+    table = Table(name, *others, title="Tried", title_justify="left")
     for row in ranking(result, extras.candidates):
         style = "bold" if row["kept"] else "dim"
         table.add_row(*(Text(str(row[key]), style) for key in ("name", "channel", "evidence", "gain", "note")))

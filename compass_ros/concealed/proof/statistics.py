@@ -15,8 +15,8 @@ _LEVEL = 0.95
 _CENTRE_M = 0.02
 _APART_M = 1e-3
 _FELT_M = 1e-3
-"""What the parameters must leave of each effect, rms, for a world to be judged [m], except in the suite `small`. Where a
-law's bounds end before, it is weaker than it was asked to be."""
+"""What the parameters must leave of each effect, rms, for a world to be judged [m], except in the suite `small`. Where
+a law's bounds end before, it is weaker than it was asked to be."""
 
 
 @dataclass(frozen=True)
