@@ -21,7 +21,7 @@ from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import changes, screen
 from compass_ros.discovery.trials import TRIED, different, further, sketched, worth
 from compass_ros.simulation import Simulator
-from compass_ros.simulation.effects import Quantity
+from compass_ros.simulation.effects import Attached, Quantity
 from compass_ros.types import Floats, Ints
 
 BEGUN = 1.1
@@ -30,6 +30,8 @@ SLIGHT = 2.0
 """Log likelihood that a further step of these first fits must promise."""
 SIZES, AROUND = (0.5, 1.0, 4.0, 16.0), 12
 """Of an effect that is tried, in its scale; directions of two amplitudes."""
+OF_TWINS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+"""Sizes of an effect that is tried in place of another."""
 FEW = 2
 """Forces that are followed to the end, and as many others."""
 
@@ -124,6 +126,22 @@ def begun(
     ]
     fit = min(fits, key=lambda f: f.point.cost)
     return Joint(wider, likelihood, fit, added)
+
+
+def in_place_of(first: Joint, attached: Attached, simulator: Simulator, likelihood: Likelihood) -> Joint:
+    """Another effect, fitted from where one has led the parameters, beginning with the best of some sizes.
+
+    Simulator and likelihood are those without either.
+    """
+    wider, whole = widened(simulator, likelihood, (attached,))
+    known, point, robust = len(likelihood.prior_mean), first.fit.point, first.fit.robust
+    starts = [
+        Point(np.concatenate([point.values[:known], numbers]), point.launch, np.inf)
+        for numbers in _sizes(attached.effect.quantities, OF_TWINS)
+    ]
+    start = starts[int(np.argmin(cost(whole, starts, robust)[0]))]
+    free = np.concatenate([first.fit.free[first.fit.free < known], np.arange(known, len(whole.prior_mean))])
+    return Joint(wider, whole, minimise(whole, start, free, 5, robust, SLIGHT, fresh=False), (attached,))
 
 
 def _sizes(quantities: Sequence[Quantity], sizes: Sequence[float] = SIZES) -> list[Floats]:

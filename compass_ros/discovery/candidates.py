@@ -13,6 +13,8 @@ class Candidate:
     """An effect on certain objects."""
 
     attached: Attached
+    twins: tuple[Attached, ...] = ()
+    """What the recordings can hardly tell from it, where that is known."""
 
     @property
     def name(self) -> str:

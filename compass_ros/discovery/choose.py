@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from compass_ros.calibration.least_squares import Point, minimise
-from compass_ros.discovery.beginning import begun
+from compass_ros.discovery.beginning import begun, in_place_of
 from compass_ros.discovery.candidates import Candidate, scattered
 from compass_ros.discovery.choice import CLEAR, LEADERS, OF_LIMIT, Choice, comes_to, evidence, undecided
 from compass_ros.discovery.joint import Joint, converge, finished, from_second_start, widened
@@ -57,7 +57,7 @@ def choose(
     if first:
         choice = _tried(choice, beginnings, unseen)
         if choice.good(unseen):
-            return _concluded(choice, candidates, unseen)
+            return _concluded(choice, space, candidates, unseen)
     sketches = sketched(space, scores)
     rounds = [part for part in (sketches[:TRIED], sketches[TRIED : 2 * TRIED]) if part]
     for promising in rounds:
@@ -71,7 +71,7 @@ def choose(
         if not choice.good(unseen) and choice.share(best) > promises:
             choice = choice.of([from_second_start(best), *others])
         if choice.good(unseen):
-            return _concluded(choice, candidates, unseen)
+            return _concluded(choice, space, candidates, unseen)
     if other := at_other_rates(space, scores):
         choice = _tried(choice, [[converge(other, slight)]], unseen)
     if not first and not choice.good(unseen):
@@ -79,7 +79,7 @@ def choose(
     if not choice.good(unseen):
         choice = _with_scatter(choice, space, unseen)
     if choice.good(unseen):
-        return _concluded(choice, candidates, unseen)
+        return _concluded(choice, space, candidates, unseen)
     return _in_pairs(choice, space, candidates, unseen) if choice.singles else choice
 
 
@@ -128,7 +128,7 @@ def _in_pairs(choice: Choice, space: Space, candidates: Sequence[Candidate], uns
     if not choice.good(unseen) and pair is not led:
         choice = _with_each(pair, choice, space)
     if choice.good(unseen):
-        return _concluded(choice, candidates, unseen)
+        return _concluded(choice, space, candidates, unseen)
     if pair.fit.point.cost < min(j.fit.point.cost for j in choice.singles):
         choice = choice.shown_by(pair)
     return replace(choice, pair=pair)
@@ -146,13 +146,29 @@ def _surely(choice: Choice, pairs: Sequence[Joint], unseen: HeldOut) -> bool:
     return choice.shown_by(best).share(best) > SURELY and unseen.helps(best)
 
 
-def _concluded(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
+def _concluded(choice: Choice, space: Space, candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
     """One effect is enough: at its optimum, with what explains as much, and with a second one where that is needed."""
+    first = simplest(choice.good(unseen))
+    choice = choice.of(sorted([*choice.singles, *_in_its_place(first, choice, space, candidates)], key=worth))
     first = simplest(choice.good(unseen))
     equal = _equals(first, choice, unseen)
     others = [j for j in choice.singles if j is not first]
     choice = choice.of([from_second_start(first), *others])
     return _with_second(replace(choice, equal=equal), candidates, unseen)
+
+
+def _in_its_place(first: Joint, choice: Choice, space: Space, candidates: Sequence[Candidate]) -> list[Joint]:
+    """Twins of an effect, fitted from where it has led the parameters, where none of their fits was enough.
+
+    What is tried first may be enough before its twins are tried. Fields are left out: their place had to be searched.
+    """
+    enough = {j.name for j in choice.singles if choice.enough(j)}
+    twins = next((c.twins for c in candidates if c.attached == first.added[0]), ())
+    untried = [c for c in map(Candidate, twins) if c.name not in enough and not c.by_force]
+    return [
+        converge(in_place_of(first, c.attached, space.simulator, space.likelihood), SLIGHT * choice.excess)
+        for c in different(untried)
+    ]
 
 
 def _clear(choice: Choice) -> bool:

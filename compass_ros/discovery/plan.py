@@ -6,7 +6,7 @@ The same table, for the shots that were recorded, says what a verdict cannot spe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -134,6 +134,15 @@ def label(candidate: Candidate, candidates: Sequence[Candidate]) -> str:
     if all(len(c.attached.objects) < size for c in others):
         return candidate.name
     return f"{candidate.name} of {'+'.join(candidate.attached.objects)}"
+
+
+def with_twins(candidates: Sequence[Candidate], plan: Plan) -> tuple[Candidate, ...]:
+    """The candidates of a plan, each with those that the shots can hardly tell from it."""
+    labelled = {label(c, candidates): c.attached for c in candidates}
+    return tuple(
+        replace(c, twins=tuple(labelled[twin] for twin in seen.twins))
+        for c, seen in zip(candidates, plan.effects, strict=True)
+    )
 
 
 def _with_twins(known: Information, effects: Sequence[Visible], left: Floats) -> tuple[Visible, ...]:

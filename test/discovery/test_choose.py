@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from compass_ros.calibration.refine import refine
-from compass_ros.discovery.beginning import begun
+from compass_ros.discovery.beginning import begun, in_place_of
 from compass_ros.discovery.candidates import Candidate, candidates
-from compass_ros.discovery.choose import _one_of, _with_contacts
+from compass_ros.discovery.choice import undecided
+from compass_ros.discovery.choose import _in_its_place, _one_of, _with_contacts
 from compass_ros.discovery.joint import fit_jointly
 from compass_ros.discovery.screen import Score
 from compass_ros.simulation.effects import EFFECTS, Attached
@@ -52,3 +53,17 @@ def test_what_an_impact_loses_is_found_beside_a_latency_though_dampings_take_it_
     assert best.added == (latency, slope)
     assert best.fit.point.cost < first.fit.point.cost - 30.0
     assert best.fit.point.values[-2:] == pytest.approx([0.03, 0.5], rel=0.1)
+
+
+def test_an_effect_that_was_tried_first_does_not_hide_its_twin() -> None:
+    """46 ms: far from what a small step says; fitted alone the delay is enough, and the latency was never tried."""
+    latency, delay = (Attached(EFFECTS[name], ()) for name in ("camera_latency", "actuation_delay"))
+    space = space_of(recorded(latency, [0.046]))
+    first = in_place_of(joint(space, latency, [0.046]), delay, simulator(), space.likelihood)
+    choice = undecided(space).of([first])
+    asked = [Candidate(latency, (delay,)), Candidate(delay, (latency,)), Candidate(SWIRL)]
+    (twin,) = _in_its_place(first, choice, space, asked)
+    assert twin.added == (latency,)
+    assert twin.fit.point.cost == pytest.approx(first.fit.point.cost, abs=3.0)
+    assert twin.fit.point.values[-1] == pytest.approx(0.046, abs=0.002)
+    assert _in_its_place(first, choice.of([first, twin]), space, asked) == []

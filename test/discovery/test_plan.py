@@ -7,7 +7,7 @@ import pytest
 
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.information import Information, information
-from compass_ros.discovery.plan import Visible, label, objections, plan_of, visibility
+from compass_ros.discovery.plan import Visible, label, objections, plan_of, visibility, with_twins
 from compass_ros.errors import DataError
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.types import Floats
@@ -69,6 +69,12 @@ def test_a_late_camera_and_a_late_arm_are_twins(seen: dict[str, Visible]) -> Non
     assert "camera_latency" in seen["actuation_delay"].twins
     assert "table_tilt" not in seen["camera_latency"].twins
     assert seen["viscous_drag"].twins == ()
+
+
+def test_candidates_are_given_their_twins(known: Information) -> None:
+    told = {c.name: {twin.effect.name for twin in c.twins} for c in with_twins(ASKED, plan_of(known))}
+    assert told["camera_latency"] == {"actuation_delay"}
+    assert told["viscous_drag"] == set()
 
 
 def test_a_limit_that_a_small_step_does_not_reach_is_seen(seen: dict[str, Visible]) -> None:
