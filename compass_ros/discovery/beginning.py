@@ -114,13 +114,8 @@ def begun(
     """
     added = (candidate.attached,)
     wider, likelihood = widened(simulator, likelihood, added)
-    effect = np.arange(len(point.values), len(likelihood.prior_mean))
-    starts = [
-        Point(np.concatenate([point.values, numbers]), point.launch, np.inf)
-        for numbers in _sizes(candidate.attached.effect.quantities, sizes)
-    ]
-    best = int(np.argmin(cost(likelihood, starts, robust)[0]))
-    everything = np.concatenate([free, effect])
+    everything = np.concatenate([free, np.arange(len(point.values), len(likelihood.prior_mean))])
+    starts, best = _starts(likelihood, point, candidate.attached, sizes, robust)
     fits = [
         minimise(likelihood, starts[i], everything, 5, robust, SLIGHT, fresh=False) for i in dict.fromkeys((0, best))
     ]
@@ -134,14 +129,22 @@ def in_place_of(first: Joint, attached: Attached, simulator: Simulator, likeliho
     Simulator and likelihood are those without either.
     """
     wider, whole = widened(simulator, likelihood, (attached,))
-    known, point, robust = len(likelihood.prior_mean), first.fit.point, first.fit.robust
+    known, fit = len(likelihood.prior_mean), first.fit
+    free = np.concatenate([fit.free[fit.free < known], np.arange(known, len(whole.prior_mean))])
+    there = replace(fit.point, values=fit.point.values[:known])
+    starts, best = _starts(whole, there, attached, OF_TWINS, fit.robust)
+    return Joint(wider, whole, minimise(whole, starts[best], free, 5, fit.robust, SLIGHT, fresh=False), (attached,))
+
+
+def _starts(
+    likelihood: Likelihood, point: Point, attached: Attached, sizes: Sequence[float], robust: float
+) -> tuple[list[Point], int]:
+    """A point with none of an effect and with some sizes of it, and which of them is best."""
     starts = [
-        Point(np.concatenate([point.values[:known], numbers]), point.launch, np.inf)
-        for numbers in _sizes(attached.effect.quantities, OF_TWINS)
+        Point(np.concatenate([point.values, numbers]), point.launch, np.inf)
+        for numbers in _sizes(attached.effect.quantities, sizes)
     ]
-    start = starts[int(np.argmin(cost(whole, starts, robust)[0]))]
-    free = np.concatenate([first.fit.free[first.fit.free < known], np.arange(known, len(whole.prior_mean))])
-    return Joint(wider, whole, minimise(whole, start, free, 5, robust, SLIGHT, fresh=False), (attached,))
+    return starts, int(np.argmin(cost(likelihood, starts, robust)[0]))
 
 
 def _sizes(quantities: Sequence[Quantity], sizes: Sequence[float] = SIZES) -> list[Floats]:

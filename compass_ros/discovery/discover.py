@@ -21,7 +21,7 @@ from compass_ros.discovery.maps import residual_map
 from compass_ros.discovery.noticed import noticed
 from compass_ros.discovery.null import simulate_null
 from compass_ros.discovery.numerics import numerical_cause
-from compass_ros.discovery.plan import objections, plan_of, with_twins
+from compass_ros.discovery.plan import knowing_twins, objections, plan_of
 from compass_ros.discovery.remainder import smooth_excess
 from compass_ros.discovery.tangents import screen
 from compass_ros.discovery.unseen import held_out
@@ -58,7 +58,7 @@ def discover(
     space, scores = screen(simulator, *plain, asked)
     null = simulate_null(space, scores, noise, seed)
     plan = plan_of(information(space, asked))
-    asked = with_twins(asked, plan)
+    asked = knowing_twins(asked, plan)
     before = residual_map(space)
     tell("screen effects", 0.3)
     found = Finding(simulator, space, refined, judge, noise, null, plan.undetectable, before, seed, warnings)

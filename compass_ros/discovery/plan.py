@@ -136,7 +136,7 @@ def label(candidate: Candidate, candidates: Sequence[Candidate]) -> str:
     return f"{candidate.name} of {'+'.join(candidate.attached.objects)}"
 
 
-def with_twins(candidates: Sequence[Candidate], plan: Plan) -> tuple[Candidate, ...]:
+def knowing_twins(candidates: Sequence[Candidate], plan: Plan) -> tuple[Candidate, ...]:
     """The candidates of a plan, each with those that the shots can hardly tell from it."""
     labelled = {label(c, candidates): c.attached for c in candidates}
     return tuple(

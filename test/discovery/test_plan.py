@@ -7,7 +7,7 @@ import pytest
 
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.information import Information, information
-from compass_ros.discovery.plan import Visible, label, objections, plan_of, visibility, with_twins
+from compass_ros.discovery.plan import Visible, knowing_twins, label, objections, plan_of, visibility
 from compass_ros.errors import DataError
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.types import Floats
@@ -72,7 +72,7 @@ def test_a_late_camera_and_a_late_arm_are_twins(seen: dict[str, Visible]) -> Non
 
 
 def test_candidates_are_given_their_twins(known: Information) -> None:
-    told = {c.name: {twin.effect.name for twin in c.twins} for c in with_twins(ASKED, plan_of(known))}
+    told = {c.name: {twin.effect.name for twin in c.twins} for c in knowing_twins(ASKED, plan_of(known))}
     assert told["camera_latency"] == {"actuation_delay"}
     assert told["viscous_drag"] == set()
 
