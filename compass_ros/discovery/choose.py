@@ -10,7 +10,7 @@ import numpy as np
 from compass_ros.calibration.least_squares import Point, minimise
 from compass_ros.discovery.beginning import begun, in_place_of
 from compass_ros.discovery.candidates import Candidate, scattered
-from compass_ros.discovery.choice import CLEAR, LEADERS, OF_LIMIT, Choice, comes_to, evidence, undecided
+from compass_ros.discovery.choice import CLEAR, LEADERS, OF_LIMIT, PREDICTS, Choice, comes_to, evidence, undecided
 from compass_ros.discovery.joint import Joint, converge, finished, from_second_start, widened
 from compass_ros.discovery.scatter import fit_scattered, follows_command, settled_scatter
 from compass_ros.discovery.screen import Score, Space
@@ -214,9 +214,18 @@ def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOu
     first = choice.singles[0]
     if 1 - choice.share(first) < NEEDED and choice.remainder(first) < SEEN:
         return choice
-    pairs = _pairs([first], candidates, SLIGHT * choice.excess)
+    slight = SLIGHT * choice.excess
+    pairs = _pairs([first], candidates, slight)
     if not pairs:
         return choice
+    judged = _beside(first, pairs, choice, unseen)
+    if not judged.two and unseen.share(first) < PREDICTS:
+        judged = _beside(first, [*pairs, *_with_contacts(first, candidates, slight)], choice, unseen)
+    return judged
+
+
+def _beside(first: Joint, pairs: Sequence[Joint], choice: Choice, unseen: HeldOut) -> Choice:
+    """The same with the best of some pairs with the first effect, and whether there are two."""
     pair = max(pairs, key=lambda p: evidence(p, unseen))
     choice = replace(choice.shown_by(pair), pair=pair)
     needed = choice.share(pair) - choice.share(first) > NEEDED or choice.remainder(first) > SEEN

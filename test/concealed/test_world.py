@@ -90,7 +90,7 @@ def test_what_a_finer_clock_leaves_after_the_parameters_is_small(untouched: Worl
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rms_m", [ASKED_M, 6e-3])  # 6 mm are 40 ms: much more than a small step can tell
+@pytest.mark.parametrize("rms_m", [ASKED_M, 6e-3])  # 6 mm are 56 ms: much more than a small step can tell
 def test_latency_of_the_camera_and_delay_of_the_arm_are_twins(rms_m: float) -> None:
     (effect,) = effects(sure(Wishes(5, names=("camera_latency",), rms_m=rms_m)))
     assert effect["twins"]["actuation_delay"] > 0.99

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from compass_ros.calibration.least_squares import minimise
 from compass_ros.calibration.refine import refine
+from compass_ros.discovery import choose
 from compass_ros.discovery.beginning import begun, in_place_of
 from compass_ros.discovery.candidates import Candidate, candidates
 from compass_ros.discovery.choice import undecided
-from compass_ros.discovery.choose import _in_its_place, _one_of, _with_contacts
+from compass_ros.discovery.choose import _in_its_place, _one_of, _with_contacts, _with_second
 from compass_ros.discovery.joint import fit_jointly
 from compass_ros.discovery.screen import Score
+from compass_ros.discovery.unseen import held_out
 from compass_ros.simulation.effects import EFFECTS, Attached
 from test.discovery.planted import CALM, HELD_OUT, PUCKS, joint, planned_space, recorded, recorded_with, space_of
 from test.simulation.table import simulator
@@ -53,6 +58,25 @@ def test_what_an_impact_loses_is_found_beside_a_latency_though_dampings_take_it_
     assert best.added == (latency, slope)
     assert best.fit.point.cost < first.fit.point.cost - 30.0
     assert best.fit.point.values[-2:] == pytest.approx([0.03, 0.5], rel=0.1)
+
+
+def test_contacts_are_asked_where_first_order_knows_no_second_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The dampings hide what an impact loses from first order, which here suggests a tilt that does nothing."""
+    latency, slope = (Attached(EFFECTS[name], ()) for name in ("camera_latency", "rate_dependent_restitution"))
+    space = space_of(recorded_with([latency, slope], [0.03, 0.5], CALM))
+    unseen = held_out(recorded_with([latency, slope], [0.03, 0.5], HELD_OUT, 1), space.likelihood, space.fit)
+    found = joint(space, latency, [0.03])
+    first = replace(found, fit=minimise(found.likelihood, found.fit.point, found.fit.free, 6, found.fit.robust))
+    scores = [
+        Score(Candidate(a), np.array(n), 1.0, np.zeros_like(space.residual))
+        for a, n in ((latency, [0.03]), (TILT, [1e-5, 1e-5]))
+    ]
+    monkeypatch.setattr(choose, "_pairs", lambda *_: [fit_jointly(space, scores, 4)])
+    asked = [c for c in candidates(simulator()) if c.name in ("rate_dependent_restitution", "tangential_impulse")]
+    choice = _with_second(undecided(space).of([first]), asked, unseen)
+    assert choice.two
+    assert choice.pair is not None
+    assert choice.pair.added == (latency, slope)
 
 
 def test_an_effect_that_was_tried_first_does_not_hide_its_twin() -> None:
