@@ -22,6 +22,7 @@ JOINS = {
     "concealed": 3,
     "bench": 4,
     "rivals": 4,
+    "proof": 4,
     "real": 4,
     "demo": 4,
     "commands": 5,

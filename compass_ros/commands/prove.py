@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from compass_ros.concealed.proof.lines import Key, Line
+    from compass_ros.proof.lines import Key, Line
 
 
 def add_to(app: typer.Typer) -> None:
@@ -32,19 +32,19 @@ def prove(
     rivals_out: Annotated[Path, typer.Option(help="what those say, one line a world")] = Path("proof/rivals.jsonl"),
 ) -> None:
     """Conceal, calibrate blindly, unseal, count. A run that was stopped goes on where it was."""
-    from compass_ros.concealed.proof import lines
-    from compass_ros.concealed.proof.campaign import Plan, in_processes
-    from compass_ros.concealed.proof.campaign import prove as campaign
-    from compass_ros.concealed.proof.one_world import SUITES
-    from compass_ros.concealed.proof.page import groups, write_page
     from compass_ros.errors import ConfigError, nearest
+    from compass_ros.proof import lines
+    from compass_ros.proof.campaign import Plan, in_processes
+    from compass_ros.proof.campaign import prove as campaign
+    from compass_ros.proof.one_world import SUITES
+    from compass_ros.proof.page import groups, write_page
 
     suites = tuple(suite or ("main",))
     for name in suites:
         if name not in SUITES:
             raise ConfigError(f"unknown suite '{name}'; known: {', '.join(SUITES)}{nearest(name, SUITES)}")
     if rivals and not table:
-        from compass_ros.concealed.proof import rivals as others
+        from compass_ros.proof import rivals as others
 
         plan = Plan(suites, worlds, others.METHOD, first_seed, others.PARTS)
         campaign(plan, rivals_out, jobs, _tell_rivals, others.in_processes(threads))
@@ -58,7 +58,7 @@ def prove(
     if page:
         write_page(page, found)
     if page and theirs:
-        from compass_ros.concealed.proof import rivals_table
+        from compass_ros.proof import rivals_table
 
         rivals_table.write_page(page, theirs, found)
 
@@ -93,7 +93,7 @@ def _print_rivals(theirs: list[Line], ours: list[Line]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compass_ros.concealed.proof.rivals_table import HEAD, by_suite, rows
+    from compass_ros.proof.rivals_table import HEAD, by_suite, rows
 
     for suite, among in by_suite(theirs).items():
         shown = Table(*HEAD, title=f"{suite}: {len(among)} worlds through other methods")
@@ -106,7 +106,7 @@ def _print(title: str, among: list[Line]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compass_ros.concealed.proof.statistics import table
+    from compass_ros.proof.statistics import table
 
     shown = Table("", "to reach", "reached", "95 % interval", "of", "", title=title)
     for row in table(among):

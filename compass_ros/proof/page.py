@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from compass_ros.concealed.proof.lines import Line
-from compass_ros.concealed.proof.statistics import Row, table
+from compass_ros.proof.lines import Line
+from compass_ros.proof.statistics import Row, table
 from compass_ros.reporting.markdown import markdown_table, replace_between
 
 BEGIN, END = "<!-- proof: begin -->\n", "<!-- proof: end -->"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest, bootstrap
 
-from compass_ros.concealed.proof.lines import Line
+from compass_ros.proof.lines import Line
 
 _LEVEL = 0.95
 _CENTRE_M = 0.02

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from compass_ros.concealed.proof import rivals
-from compass_ros.concealed.proof.campaign import Plan, prove
-from compass_ros.concealed.proof.lines import read
-from compass_ros.concealed.proof.one_world import Suite
-from compass_ros.concealed.proof.rivals_table import BEGIN, END, rows, write_page
+from compass_ros.proof import rivals
+from compass_ros.proof.campaign import Plan, prove
+from compass_ros.proof.lines import read
+from compass_ros.proof.one_world import Suite
+from compass_ros.proof.rivals_table import BEGIN, END, rows, write_page
 
 TILT = {"name": "table_tilt", "outside": False, "twins": ["crosswind"]}
 DRAG = {"name": "viscous_drag", "outside": False, "twins": []}

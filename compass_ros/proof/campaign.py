@@ -8,9 +8,9 @@ from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
-from compass_ros.concealed.proof import lines
-from compass_ros.concealed.proof.lines import Key, Line
-from compass_ros.concealed.proof.one_world import SUITES, run
+from compass_ros.proof import lines
+from compass_ros.proof.lines import Key, Line
+from compass_ros.proof.one_world import SUITES, run
 
 RunWorld = Callable[[Key], dict[str, object]]
 Tell = Callable[[Key, Line, int, int], None]

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from compass_ros.concealed.proof.one_world import Suite, run
+from compass_ros.proof.one_world import Suite, run
 
 BLIND = [sys.executable, "-m", "compass_ros.concealed.blind"]
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from compass_ros.concealed.proof.lines import Line
-from compass_ros.concealed.proof.statistics import wilson
+from compass_ros.proof.lines import Line
+from compass_ros.proof.statistics import wilson
 from compass_ros.reporting.markdown import markdown_table, replace_between
 
 BEGIN, END = "<!-- rivals: begin -->\n", "<!-- rivals: end -->"

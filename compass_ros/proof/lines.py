@@ -13,9 +13,9 @@ from compass_ros.errors import ConfigError
 from compass_ros.reporting.atomic import write_text
 
 Line = Mapping[str, Any]
-PACKAGE = Path(__file__).parents[2]
+PACKAGE = Path(__file__).parents[1]
 METHOD = ("calibration", "discovery", "simulation", "cells", "pipeline.py", "results.py", "types.py", "config.py")
-WORLDS = ("concealed", "cells")
+WORLDS = ("concealed", "cells", "proof/one_world.py")
 
 
 @dataclass(frozen=True)

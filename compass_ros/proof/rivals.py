@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from compass_ros.concealed.comparison import judge_names
-from compass_ros.concealed.proof.campaign import RunWorld
-from compass_ros.concealed.proof.one_world import SUITES, Suite, concealed
 from compass_ros.concealed.seal import unseal
+from compass_ros.proof.campaign import RunWorld
+from compass_ros.proof.one_world import SUITES, Suite, concealed
 
 METHOD = "rivals"
 """The method in the lines of the results file."""

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from compass_ros.concealed.proof import campaign, lines
-from compass_ros.concealed.proof.campaign import Plan, prove
-from compass_ros.concealed.proof.lines import Key
-from compass_ros.concealed.proof.one_world import SUITES
-from compass_ros.concealed.proof.page import BEGIN, END, write_page
-from compass_ros.concealed.proof.statistics import table
 from compass_ros.errors import ConfigError
+from compass_ros.proof import campaign, lines
+from compass_ros.proof.campaign import Plan, prove
+from compass_ros.proof.lines import Key
+from compass_ros.proof.one_world import SUITES
+from compass_ros.proof.page import BEGIN, END, write_page
+from compass_ros.proof.statistics import table
 
 PLAN = Plan(("main",), worlds=3)
 SEEDS = [SUITES["main"].first_seed + i for i in range(3)]
