@@ -322,6 +322,11 @@ def test_the_demo_overwrites_nothing_of_others(tmp_path: Path, run: Run) -> None
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
+def test_a_table_of_no_results_is_one_line(tmp_path: Path, refused: Callable[..., str]) -> None:
+    nowhere = tmp_path / "none.jsonl"
+    assert f"{nowhere}: no results" in refused("prove", "--table", "--out", nowhere)
+
+
 def test_a_cut_bag_is_made_whole(good: Path, tmp_path: Path, run: Run) -> None:
     bag = cut_off(good, tmp_path)
     status, out, _ = run("record", "--recover", bag)

@@ -51,6 +51,8 @@ def prove(
     elif not table:
         campaign(Plan(suites, worlds, method, first_seed), out, jobs, _tell, in_processes(threads))
     found = list(lines.read(out).values())
+    if not found and not rivals:
+        raise ConfigError(f"{out}: no results; `compass prove` without --table makes them")
     for (name, by), among in groups(found).items():
         _print(f"{name}, method {by}: {len(among)} worlds", among)
     theirs = list(lines.read(rivals_out).values())
