@@ -93,19 +93,26 @@ def _tell_rivals(key: Key, line: Line, done: int, total: int) -> None:
 
 def _print_rivals(theirs: list[Line], ours: list[Line]) -> None:
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
-    from compass_ros.proof.rivals_table import HEAD, by_suite, rows
+    from compass_ros.proof.rivals_table import HEAD, NAMED, by_suite, rows
 
     for suite, among in by_suite(theirs).items():
-        shown = Table(*HEAD, title=f"{suite}: {len(among)} worlds through other methods")
-        for row in rows(among, ours):
-            shown.add_row(*row)
-        Console().print(shown)
+        found = rows(among, ours)
+        for first, last in ((1, NAMED), (NAMED, len(HEAD))):  # in two parts: nine columns are too many for a terminal
+            shown = Table(title=f"{suite}: {len(among)} worlds through other methods" if first == 1 else None)
+            shown.add_column(HEAD[0], no_wrap=True)
+            for head in HEAD[first:last]:
+                shown.add_column(escape(head), justify="right", overflow="fold")
+            for row in found:
+                shown.add_row(row[0], *row[first:last])
+            Console().print(shown)
 
 
 def _print(title: str, among: list[Line]) -> None:
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
     from compass_ros.proof.statistics import table
@@ -113,5 +120,5 @@ def _print(title: str, among: list[Line]) -> None:
     shown = Table("", "to reach", "reached", "95 % interval", "of", "", title=title)
     for row in table(among):
         verdict = {True: "yes", False: "no", None: ""}[row.reached]
-        shown.add_row(row.what, row.bar, row.value, row.interval, row.count, verdict)
+        shown.add_row(escape(row.what), row.bar, row.value, row.interval, row.count, verdict)
     Console().print(shown)

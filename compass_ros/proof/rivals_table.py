@@ -20,6 +20,8 @@ HEAD = (
     *("nothing missing: false alarm", "something missing: alarm"),
     *("held out [mm]", "above the floor [mm]", "time [s]"),
 )
+NAMED = 6
+"""Columns of it that say what is missing; the others say how well it is predicted."""
 
 
 @dataclass(frozen=True)
