@@ -32,7 +32,7 @@ demo: install
 # Two test processes on two cores: linear algebra must not start threads of its own.
 test: export OMP_NUM_THREADS = 1
 test: lint
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not ros" $(ARGS)
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not ros" $(ARGS)
 	$(BIN)/python -m pytest -m ros $(ARGS)
 
 soak: install

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
+from typing import Annotated
 
 import typer
 from threadpoolctl import threadpool_limits
 
+from compass_ros import __version__
 from compass_ros.commands import (
     bench,
     calibrate,
@@ -30,12 +32,26 @@ app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    help="What went wrong with my simulator? Calibrate it from recordings, and find the physics that it lacks.",
 )
 for module in (demo, plan, track, record, calibrate, diagnose, report, policy):
     module.add_to(app)
 for module in (conceal, unseal, prove, rivals, bench, real, tables):
     module.add_to(app)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"compass_ros {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def about(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """What went wrong with my simulator? Calibrate it from recordings, and find the physics that it lacks."""
 
 
 def main() -> None:

@@ -14,6 +14,14 @@ Run = Callable[..., tuple[int, str, str]]
 """Words of a command line -> status, standard output, standard error."""
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Slow tests first: otherwise the last of them runs for minutes while the other process has nothing left to do.
+
+    Those that need ROS are not run in parallel, and keep their order: the tests of a folder share a DDS domain.
+    """
+    items.sort(key=lambda item: not item.get_closest_marker("slow") or bool(item.get_closest_marker("ros")))
+
+
 @pytest.fixture
 def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
     """Runs `compass` with these words, in this process."""

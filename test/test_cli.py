@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import cv2
 import numpy as np
@@ -303,6 +304,11 @@ def test_wrong_use_is_status_2(run: Run, tmp_path: Path) -> None:
         assert status == 2, words
         assert out == ""
         assert "Traceback" not in err
+
+
+def test_the_version_is_that_of_the_package(run: Run) -> None:
+    package = Path(__file__).parents[1] / "package.xml"
+    assert run("--version") == (0, f"compass_ros {ElementTree.parse(package).findtext('version')}\n", "")
 
 
 def test_the_demo_refuses_effects_that_it_cannot_conceal(tmp_path: Path, run: Run) -> None:

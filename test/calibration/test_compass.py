@@ -39,6 +39,7 @@ def test_finds_eight_causes_among_sixty_four_and_closes_the_gap(noise: float, se
     assert found.rollouts == 10 + 640 + 10
 
 
+@pytest.mark.slow
 def test_decoys_are_dropped_and_keep_their_values() -> None:
     world = planted(12, 3, seed=2)
     found = run(world, FAST)
@@ -49,6 +50,7 @@ def test_decoys_are_dropped_and_keep_their_values() -> None:
     assert found.trace[-1].difference.mean() < 0.6 * found.trace[0].difference.mean()
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not() -> None:
     world = planted(6, 2)
     first, again, other = run(world, SMALL, 1), run(world, SMALL, 1), run(world, SMALL, 2)

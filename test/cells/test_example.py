@@ -46,6 +46,7 @@ def test_the_calibration_finds_them() -> None:
     assert not found["env@dyna@gravity"].identifiable
 
 
+@pytest.mark.slow
 def test_nothing_is_missing_and_the_sentence_says_what_the_table_says() -> None:
     """The first velocity is fitted to each held-out swing, for both."""
     result, _ = calibrate(episodes(), CELL, calibration_config({}))

@@ -55,6 +55,7 @@ def fast(env: CellEnv, values: Floats, actions: Floats) -> Floats:
     return np.asarray(Simulator(env.cell).observe(np.tile(values, (len(actions), 1)), actions, time))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_an_arm_plays_the_shot_that_the_fast_path_plays(env: CellEnv, seed: int) -> None:
     values, action = drawn(env, seed)

@@ -25,6 +25,7 @@ def strength(name: str, other: float = 1.0) -> Strength:
     return sized(ingredient(name, judge().base, other=other), judge(), TARGET_M)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["quadratic_drag", "table_tilt", "lens_distortion"])
 def test_the_library_s_own_formula_is_found_exactly(name: str) -> None:
     own = strength(name, other=0.0)
@@ -35,6 +36,7 @@ def test_the_library_s_own_formula_is_found_exactly(name: str) -> None:
         assert found.numbers["k1"] == pytest.approx(0.05 * own.ingredient.size * own.ingredient.shape["hand"], rel=0.01)
 
 
+@pytest.mark.slow
 def test_trajectories_are_met_better_than_by_accelerations() -> None:
     own = strength("viscous_drag")
     played = table().play([own.ingredient])

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 
+from compass_ros.concealed import world as whole
 from compass_ros.concealed.laws import KNOWN, OUTSIDE
 from compass_ros.concealed.recording import NOISES, episodes
 from compass_ros.concealed.shots import FARTHEST, NEAREST, choose_shots
@@ -16,6 +18,14 @@ from compass_ros.types import Episode, Floats
 from test.concealed.scene import INPUTS, cell
 
 ASKED_M = 2e-3
+
+
+@pytest.fixture(scope="module", autouse=True)
+def six_shots() -> Iterator[None]:
+    """Half of a world's shots: the same code in half of the time. Whole worlds: test_sealed_set."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(whole, "SHOTS", 6)
+        yield
 
 
 def sure(wishes: Wishes) -> World:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from compass_ros.calibration.refine import refine
 from compass_ros.discovery.beginning import from_the_beginning
@@ -16,6 +17,7 @@ SHOTS = np.concatenate([CALM, HELD_OUT])
 ASKED = ("off_centre_mass", "tangential_impulse", "swirl", "camera_scale")
 
 
+@pytest.mark.slow
 def test_a_centre_of_mass_beside_the_centre() -> None:
     """Towards neither axis: from there the fit ends elsewhere."""
     effect = Attached(EFFECTS["off_centre_mass"], PUCKS)
@@ -29,5 +31,6 @@ def test_a_centre_of_mass_beside_the_centre() -> None:
     assert abs(best.fit.point.values[-2:] - [-0.002, -0.002]).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_a_fair_fit_asks_for_nothing() -> None:
     assert not poor(refine(recorded(None, []), simulator().defaults))

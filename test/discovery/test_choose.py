@@ -26,6 +26,7 @@ TILT = Attached(EFFECTS["table_tilt"], PUCKS)
 PLANTED = [0.03, -0.05, 0.04, 0.1, 0.5]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("swirl_at", [0, 1])
 def test_one_of_a_pair_that_does_nothing_can_be_left_out_and_the_other_cannot(swirl_at: int) -> None:
     space = space_of(recorded(SWIRL, PLANTED))
@@ -47,6 +48,7 @@ def test_a_field_as_narrow_as_its_range_allows_stands_for_something_else(radius:
     assert not joint(planned_space(), TILT, [1e-3, 0.0]).stands_in
 
 
+@pytest.mark.slow
 def test_what_an_impact_loses_is_found_beside_a_latency_though_dampings_take_it_away() -> None:
     latency, slope = (Attached(EFFECTS[name], ()) for name in ("camera_latency", "rate_dependent_restitution"))
     likelihood = recorded_with([latency, slope], [0.03, 0.5], np.concatenate([CALM, HELD_OUT]))
@@ -60,6 +62,7 @@ def test_what_an_impact_loses_is_found_beside_a_latency_though_dampings_take_it_
     assert best.fit.point.values[-2:] == pytest.approx([0.03, 0.5], rel=0.1)
 
 
+@pytest.mark.slow
 def test_contacts_are_asked_where_first_order_knows_no_second_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     """The dampings hide what an impact loses from first order, which here suggests a tilt that does nothing."""
     latency, slope = (Attached(EFFECTS[name], ()) for name in ("camera_latency", "rate_dependent_restitution"))

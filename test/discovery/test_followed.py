@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from compass_ros.calibration.least_squares import minimise, start
 from compass_ros.calibration.refine import ROBUST, refine
@@ -36,6 +37,7 @@ def test_an_outlier_and_missing_frames_are_no_loss() -> None:
     assert np.all(doubted(replace(likelihood, measured=measured), residual) == 1.0)
 
 
+@pytest.mark.slow
 def test_what_is_followed_stays_as_it_is() -> None:
     refined = refine(recorded(None, [], SHOTS), simulator().defaults)
     likelihood, fit = followed(refined.likelihood, refined.fit)

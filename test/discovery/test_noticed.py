@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
@@ -20,6 +21,7 @@ DRAG = Attached(EFFECTS["viscous_drag"], PUCKS)
 NOISE = Noise(np.full(4, SIGMA), 0.0)
 
 
+@pytest.mark.slow
 def test_what_hardly_moves_the_fitted_shots_matters_where_it_moves_others() -> None:
     """A drag of 0.2 mm in the fitted shots stands out from the noise; a tracker may be as wrong by itself."""
     plain = refine(recorded(DRAG, [0.016]), simulator().defaults)

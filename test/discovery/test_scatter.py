@@ -44,6 +44,7 @@ def tried(deviation: Floats, others: Likelihood | None = None) -> tuple[Choice, 
     return _with_scatter(undecided(space), space, unseen), unseen
 
 
+@pytest.mark.slow
 def test_deviations_and_their_spread_are_found_and_predict_other_shots() -> None:
     choice, unseen = tried(DEVIATION)
     (joint,) = choice.good(unseen)
@@ -58,11 +59,13 @@ def test_deviations_and_their_spread_are_found_and_predict_other_shots() -> None
     assert 2 * joint.fit.point.cost < 1.1 * joint.likelihood.measurements
 
 
+@pytest.mark.slow
 def test_deviations_that_a_speed_explains_are_no_scatter() -> None:
     choice, _ = tried(-0.3 * (SHOTS[:, 3] - np.mean(SHOTS[:, 3])))
     assert not choice.singles
 
 
+@pytest.mark.slow
 def test_a_scatter_that_does_not_predict_is_dropped_before_pairs_are_made() -> None:
     choice, _ = tried(DEVIATION, recorded_with([SWIRL], [0.03, -0.05, 0.06, 0.1, 0.5], HELD_OUT, 1))
     assert not choice.singles

@@ -17,6 +17,7 @@ PULSATION = Attached(EFFECTS["pulsating_lift"], PUCKS)
 TILT = Attached(EFFECTS["table_tilt"], PUCKS)
 
 
+@pytest.mark.slow
 def test_half_of_the_true_frequency_leads_to_the_true_one() -> None:
     space = space_of(recorded(PULSATION, [0.0, 0.02, 0.7]))
     nothing = np.zeros_like(space.residual)

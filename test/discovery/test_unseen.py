@@ -28,6 +28,7 @@ PENDULUM = load(Path(__file__).parents[2] / "examples" / "own_cell" / "pendulum.
 DRAG = Attached(EFFECTS["viscous_drag"], PUCKS)
 
 
+@pytest.mark.slow
 def test_only_shots_on_another_table_are_unexpected() -> None:
     refined = refine(recorded(None, []), simulator().defaults)
     assert refined.chi_square < 1.2
@@ -90,6 +91,7 @@ def swings(numbers: tuple[float, ...], seed: int) -> Likelihood:
     return pose(plain, data, Noise(np.array([0.001]), 0.0)).likelihood
 
 
+@pytest.mark.slow
 def test_first_states_that_nobody_knew_well_are_no_surprise() -> None:
     refined = refine(swings((), 0), Simulator(PENDULUM, threads=1).defaults)
     assert refined.chi_square < 1.2

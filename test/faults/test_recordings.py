@@ -65,6 +65,7 @@ def finite(result: dict[str, Any]) -> bool:
     return all(row["bounds"][0] - 1e-9 <= row["value"] <= row["bounds"][1] + 1e-9 for row in rows)
 
 
+@pytest.mark.slow
 def test_one_episode(sound: list[Episode], tmp_path: Path) -> None:
     result = calibrated(sound[:1], tmp_path)
     assert result["warnings"][0].startswith("one episode is few")
@@ -73,12 +74,14 @@ def test_one_episode(sound: list[Episode], tmp_path: Path) -> None:
     assert finite(result)
 
 
+@pytest.mark.slow
 def test_identical_episodes(sound: list[Episode], tmp_path: Path) -> None:
     result = calibrated([replace(sound[0], name=f"copy{i}") for i in range(4)], tmp_path)
     assert any("3 of 4 episodes are copies of others" in said for said in result["warnings"])
     assert finite(result)
 
 
+@pytest.mark.slow
 def test_a_puck_that_never_moves(sound: list[Episode], tmp_path: Path) -> None:
     def still(episode: Episode) -> Episode:
         tracks = [

@@ -30,6 +30,9 @@ SHARED_MEMORY = Path("/dev/shm")
 PATIENCE_S = 180.0
 """How long a test waits for what must come. A machine may be slow; where all is well, nobody waits."""
 
+SETTLE_S = 0.3
+"""How long a new client waits before it asks: a server drops its answer to one that it has not discovered in 0.1 s."""
+
 
 def until(condition: Callable[[], bool], what: str, timeout_s: float = PATIENCE_S) -> None:
     """Wait for a condition; fail with a sentence."""
@@ -112,6 +115,7 @@ class Probe:
         self._context = Context()
         self._context.init(domain_id=domain)
         self.node = Node("probe", context=self._context, enable_rosout=False, start_parameter_services=False)
+        self._clients: dict[str, Client] = {}
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._thread = threading.Thread(target=self._spin, name="probe")
@@ -153,8 +157,11 @@ class Probe:
 
     def call(self, kind: Any, service: str, request: Any = None) -> Any:
         """The response of a service."""
-        client: Client = self.node.create_client(kind, service)
-        assert client.wait_for_service(PATIENCE_S), f"no service {service}"
+        client = self._clients.get(service)
+        if client is None or not client.service_is_ready():
+            client = self._clients[service] = client or self.node.create_client(kind, service)
+            assert client.wait_for_service(PATIENCE_S), f"no service {service}"
+            time.sleep(SETTLE_S)
         return self.result(client.call_async(request or kind.Request()))
 
     def action(self, kind: Any, name: str) -> ActionClient:

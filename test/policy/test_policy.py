@@ -67,12 +67,14 @@ def test_a_sure_hand_repeats_its_shot() -> None:
     assert known().judge(BEST, 0.2, seed=0).success < 1.0
 
 
+@pytest.mark.slow
 def test_an_agent_finds_the_best_action() -> None:
     given = known()
     found = train(given, 3840, seed=1).action()
     assert given.distances(found[None])[0] < 0.25 < 0.5 * np.linalg.norm(BEST)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_agent() -> None:
     one, two, other = (train(known(), 640, seed).action() for seed in (3, 3, 4))
     np.testing.assert_array_equal(one, two)
@@ -102,6 +104,7 @@ def test_wrong_goals_are_refused(goal: Goal, message: str) -> None:
         shots(goal)
 
 
+@pytest.mark.slow
 def test_the_command(run: Run, tmp_path: Path) -> None:
     result = write_calibration(tmp_path / "result", CELL, {"puck1@dyna@friction_sliding": 0.03})
     words = ("--rollouts", 640, "--threads", 1, "--out", tmp_path / "out")

@@ -107,7 +107,8 @@ def test_worlds_are_run_again_when_the_rivals_change(tmp_path: Path, monkeypatch
 
 @pytest.mark.slow
 def test_a_sealed_world_through_a_rival() -> None:
-    found: Any = rivals.run(Suite("tilt", ("--effect", "table_tilt", "--rms", "6e-3"), 3), 3, 1, ["calibrated"])
+    suite = Suite("off centre", ("--effect", "off_centre_mass", "--rms", "6e-3"), 3)
+    found: Any = rivals.run(suite, 3, 1, ["calibrated"])
     assert found["error"] is None, found["error"]
-    assert found["truth"] == ["table_tilt"]
+    assert found["truth"] == ["off_centre_mass"]
     assert found["rivals"]["calibrated"]["held_out_m"] > found["floor_m"]

@@ -73,12 +73,12 @@ def test_a_sealed_world() -> None:
 @pytest.mark.slow
 def test_conceal_and_unseal_as_a_user_types_them(tmp_path: Path) -> None:
     world, answers = tmp_path / "world", tmp_path / "answers"
-    asked = ("--seed", "4", "--effect", "swirl", "--rms", "3e-3", "--noise", "tracker")
+    asked = ("--seed", "4", "--effect", "off_centre_mass", "--rms", "3e-3", "--noise", "tracker")
     done = compass("conceal", *asked, "--out", world, "--answers", answers)
     assert done.returncode == 0, done.stderr
     assert len(list(world.glob("shot_*/*.mcap"))) == 12
     shown = compass("unseal", world, "--answers", answers)
-    strength = re.match(r"true: swirl on puck1 and puck2, ([\d.]+) mm rms", shown.stdout)
+    strength = re.match(r"true: off_centre_mass on puck1 and puck2, ([\d.]+) mm rms", shown.stdout)
     assert strength, shown.stdout
     assert float(strength[1]) == pytest.approx(3.0, rel=0.16)
     taken = compass("conceal", *asked, "--out", world, "--answers", answers)
