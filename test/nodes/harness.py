@@ -16,7 +16,7 @@ import yaml
 from rclpy.action import ActionClient
 from rclpy.client import Client
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from rclpy.task import Future
@@ -118,20 +118,19 @@ class Probe:
         self._clients: dict[str, Client] = {}
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
-        self._thread = threading.Thread(target=self._spin, name="probe")
+        self._closed = Future()
+        self._thread = threading.Thread(
+            target=self._executor.spin_until_future_complete, args=(self._closed,), name="probe"
+        )
         self._thread.start()
 
-    def _spin(self) -> None:
-        try:
-            self._executor.spin()
-        except ExternalShutdownException:
-            return  # the test has ended
-
     def close(self) -> None:
-        self._context.try_shutdown()
+        """Stop spinning, then end the context: a thread that spins can meet one that is gone."""
+        self._closed.set_result(None)
         self._thread.join()
         self._executor.shutdown()
         self.node.destroy_node()
+        self._context.try_shutdown()
 
     def listen(
         self, kind: type[Message], topic: str, qos: QoSProfile = RELIABLE, connect: bool = True
