@@ -38,7 +38,7 @@ class Plan:
 
 def in_processes(threads: int) -> RunWorld:
     """A world by the real command line."""
-    return lambda key: run(SUITES[key.suite], key.seed, key.method, threads)
+    return lambda key: run(SUITES[key.suite], key.seed, key.method, threads) | {"threads": threads}
 
 
 def prove(plan: Plan, path: Path, jobs: int, tell: Tell, run_world: RunWorld) -> None:

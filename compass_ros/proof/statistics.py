@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,10 @@ _APART_M = 1e-3
 _FELT_M = 1e-3
 """What the parameters must leave of each effect, rms, for a world to be judged [m], except in the suite `small`. Where
 a law's bounds end before, it is weaker than it was asked to be."""
+_LOWER = {"tracker": 0.05}
+"""By how much a suite may stay below the main suite's shares."""
+_TWO_CORES = {"jobs": 1, "threads": 2}
+"""How a world must have been run for its time to count."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +38,10 @@ class Row:
 
 def table(found: Sequence[Line]) -> list[Row]:
     """The rows for the worlds of one suite and method. A world whose run failed counts as wrong, never as missing."""
+    suite = str(found[0]["suite"]) if found else "main"
+    if suite == "small":
+        return _small(found)
+    lower = _LOWER.get(suite, 0.0)
     felt = [x for x in found if _felt(x)]
     one, two, none, outside = ([x for x in felt if _kind(x) == kind] for kind in ("one", "two", "none", "outside"))
     alone = [x for x in one if _mark(x, "first_right") is not None and _mark(x, "right")]
@@ -42,22 +50,34 @@ def table(found: Sequence[Line]) -> list[Row]:
     centres = [_mark(x, "centre_error_m") for x in one if _mark(x, "right") and _mark(x, "centre_error_m") is not None]
     gains = [_mark(x, "gain") for x in one + two if _mark(x, "gain") is not None]
     return [
-        _share("one effect, named right or within its class", one, "right", 0.95),
-        _share("of these, first name right where the class has one member", alone, "first_right", 0.95),
-        _share("two effects, both named or within their classes", two, "right", 0.75),
-        _share("nothing missing: none", none, "right", 0.97),
-        _share("outside the library: unknown", outside, "right", 0.90),
-        _share("of these, where no formula of the library comes within 1 mm rms", apart, "right", 0.90),
-        _where("outside the library: object, phase and channel right", outside, 0.90),
+        _share("one effect, named right or within its class", one, "right", 0.95 - lower),
+        _share("of these, first name right where the class has one member", alone, "first_right", 0.95 - lower),
+        _share("two effects, both named or within their classes", two, "right", 0.75 - lower),
+        _share("nothing missing: none", none, "right", 0.97 - lower),
+        _share("outside the library: unknown", outside, "right", 0.90 - lower),
+        _share("of these, where no formula of the library comes within 1 mm rms", apart, "right", 0.90 - lower),
+        _where("outside the library: object, phase and channel right", outside, 0.90 - lower),
         _share("outside the library: misnamed", outside, "misnamed", 0.03, most=True),
         _share("one effect: misnamed", one, "misnamed", 0.03, most=True),
-        _where("one effect: object, phase and channel right", one, 0.97),
-        _proportion(f"centre within {100 * _CENTRE_M:.0f} cm", [c <= _CENTRE_M for c in centres], 0.97),
+        _where("one effect: object, phase and channel right", one, 0.97 - lower),
+        _proportion(f"centre within {100 * _CENTRE_M:.0f} cm", [c <= _CENTRE_M for c in centres], 0.97 - lower),
         _median("parameters of effects: median error", [c["error"] for c in checks], 0.05, most=True),
         _between("parameters of effects: 90 % intervals hold the truth", [c["covered"] for c in checks], 0.80, 0.97),
-        _median("share of the excess held-out error removed, median", gains, 0.9),
-        _seconds("calibration and discovery, median [s]", found, 90.0),
+        _median("share of the excess held-out error removed, median", gains, 0.9 - lower),
+        *_times(found),
         Row("left out above: an effect below 1 mm rms", "-", str(len(found) - len(felt)), "-", str(len(found)), None),
+    ]
+
+
+def _small(found: Sequence[Line]) -> list[Row]:
+    """Effects of 0.5 mm: seldom a wrong name; where the right one is not found, silence or doubt."""
+    missed = [line for line in found if not _mark(line, "right")]
+    modest = [_mark(line, "verdict") in ("none", "ambiguous") and not _mark(line, "misnamed") for line in missed]
+    return [
+        _share("one effect, named right or within its class", found, "right", 0.80),
+        _proportion("of the others: `none` or `ambiguous`", modest, 1.0),
+        _share("one effect: misnamed", found, "misnamed", 0.03, most=True),
+        *_times(found),
     ]
 
 
@@ -115,9 +135,24 @@ def _median(what: str, values: Sequence[float], bar: float, most: bool = False) 
     return _of_medians(what, values, bar, most, lambda x: f"{100 * x:.1f} %")
 
 
-def _seconds(what: str, among: Sequence[Line], bar: float) -> Row:
-    seconds = [line["seconds"]["calibrate"] for line in among if line.get("seconds")]
-    return _of_medians(what, seconds, bar, True, lambda x: f"{x:.0f}")
+def _times(found: Sequence[Line]) -> list[Row]:
+    """Of calibration and discovery: worlds that had two cores to themselves are judged, the others shown."""
+    timed = [line for line in found if line.get("seconds")]
+    alone = [line["seconds"]["calibrate"] for line in timed if _alone(line)]
+    shared = [line["seconds"]["calibrate"] for line in timed if not _alone(line)]
+    rows = [_of_medians("calibration and discovery on two cores, median [s]", alone, 90.0, True, _whole)]
+    if shared:
+        row = _of_medians("the same with one thread beside other work, median [s]", shared, 0.0, True, _whole)
+        rows.append(replace(row, bar="-", reached=None))
+    return rows
+
+
+def _alone(line: Line) -> bool:
+    return all(line.get(name) == value for name, value in _TWO_CORES.items())
+
+
+def _whole(seconds: float) -> str:
+    return f"{seconds:.0f}"
 
 
 def _of_medians(what: str, values: Sequence[float], bar: float, most: bool, shown: Callable[[float], str]) -> Row:

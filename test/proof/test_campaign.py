@@ -160,7 +160,32 @@ def test_rows_look_at_their_own_worlds() -> None:
     assert rows["of these, where no formula of the library comes within 1 mm rms"].count == "1 of 1"
     assert rows["parameters of effects: median error"].value == "3.0 %"
     assert rows["parameters of effects: 90 % intervals hold the truth"].count == "2 of 3"
-    assert rows["calibration and discovery, median [s]"].value == "60"
+
+
+def test_only_worlds_with_two_cores_to_themselves_are_timed() -> None:
+    found = worlds({}, {}, {})
+    assert times(found) == [("-", None), ("60", None)]
+    found[0] |= {"jobs": 1, "threads": 2, "seconds": {"calibrate": 70.0}}
+    found[1] |= {"jobs": 1, "threads": 2, "seconds": {"calibrate": 100.0}}
+    found[2] |= {"jobs": 2, "threads": 2}
+    assert times(found) == [("85", True), ("60", None)]
+    assert times(found[1:2]) == [("100", False)]
+
+
+def times(found: list[dict[str, Any]]) -> list[tuple[str, bool | None]]:
+    return [(row.value, row.reached) for row in table(found) if "[s]" in row.what]
+
+
+def test_small_effects_ask_for_modesty() -> None:
+    missed = {"right": False, "found": []}
+    found = worlds(*[{}] * 8, missed | {"verdict": "none"}, missed | {"verdict": "unknown"})
+    rows = table([line | {"suite": "small"} for line in found])
+    assert [(row.count, row.reached) for row in rows[:3]] == [("8 of 10", True), ("1 of 2", False), ("0 of 10", True)]
+
+
+def test_the_tracker_s_noise_may_cost_five_points() -> None:
+    found = worlds(*[{}] * 9, {"right": False})
+    assert [table([line | {"suite": s} for line in found])[0].reached for s in ("main", "tracker")] == [False, True]
 
 
 def test_an_effect_that_parameters_absorb_is_not_asked_for() -> None:
@@ -168,7 +193,7 @@ def test_an_effect_that_parameters_absorb_is_not_asked_for() -> None:
     found = [line | effects for line, effects in zip(worlds({}, {}), (strong, weak), strict=True)]
     assert table(found)[0].count == "1 of 1"
     assert (table(found)[-1].value, table(found)[-1].count) == ("1", "2")
-    assert table([line | {"suite": "small"} for line in found])[0].count == "2 of 2"
+    assert table([line | {"suite": "small"} for line in found])[0].count == "2 of 2", "small by intent"
 
 
 def test_no_worlds_make_no_claims() -> None:
