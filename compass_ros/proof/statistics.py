@@ -142,7 +142,7 @@ def _times(found: Sequence[Line]) -> list[Row]:
     shared = [line["seconds"]["calibrate"] for line in timed if not _alone(line)]
     rows = [_of_medians("calibration and discovery on two cores, median [s]", alone, 90.0, True, _whole)]
     if shared:
-        row = _of_medians("the same with one thread beside other work, median [s]", shared, 0.0, True, _whole)
+        row = _of_medians("the same, run in other ways, median [s]", shared, 0.0, True, _whole)
         rows.append(replace(row, bar="-", reached=None))
     return rows
 
