@@ -28,6 +28,7 @@ from compass_ros.calibration.least_squares import (
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.residuals import chi_square, covariance, information_share, typical_residual
 from compass_ros.calibration.screen import WORTH, acting, coupling, independent, many
+from compass_ros.calibration.valleys import along_valleys
 from compass_ros.types import Floats, Ints
 
 HORIZONS = (0.16, 0.28, 0.4, 0.55, 0.75, 1.0)
@@ -205,6 +206,7 @@ def settled(likelihood: Likelihood, fit: Fit) -> Fit:
             break
         steps = FINE[taken % len(FINE)] * difference_steps(linear)
         linear = central(likelihood, point, free, steps, linear.onset if taken else None)
+        linear = along_valleys(likelihood, point, linear, free, robust)
         before = point.cost
         for _ in range(SERVE):
             best, residual = _best_step(likelihood, point, linear, free, robust)
@@ -291,13 +293,16 @@ def with_roughness(likelihood: Likelihood, fit: Fit, draws: int = 6) -> Likeliho
     return replace(likelihood, sigma=np.hypot(likelihood.sigma, grown))
 
 
-def with_launches(likelihood: Likelihood, values: Floats) -> Point:
-    """(P,) values that stay as they are, each episode with the launch that agrees best with it."""
+def with_launches(likelihood: Likelihood, values: Floats, free: Ints = NONE, steps: Floats | None = None) -> Point:
+    """(P,) values that stay as they are, each episode with the launch that agrees best with it.
+
+    Those that are `free` may move; (p,) `steps` of their differences, where known.
+    """
     point = start(likelihood, values)
-    if not likelihood.launch_std.any():
+    if not likelihood.launch_std.any() and not len(free):
         return point
     robust = max(ROBUST, 3.0 * typical_residual(likelihood, point))
-    return minimise(likelihood, point, NONE, 12, robust, tolerance=1.0, fresh=False).point
+    return minimise(likelihood, point, free, 12, robust, tolerance=1.0, fresh=False, steps=steps).point
 
 
 def standard_errors(refined: Refined) -> tuple[Ints, Floats]:

@@ -9,9 +9,19 @@ from scipy.linalg import block_diag
 
 from compass_ros.calibration.least_squares import Fit, difference_steps, linearise, robust_loss, robust_weight
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import ROBUST, Refined, calmed, with_launches
+from compass_ros.calibration.refine import (
+    COARSE,
+    FELT,
+    FELT_SHARE,
+    ROBUST,
+    Refined,
+    calmed,
+    sensitivity,
+    with_launches,
+)
 from compass_ros.calibration.residuals import covariance
 from compass_ros.discovery.joint import Joint
+from compass_ros.types import Floats, Ints
 
 HELD_OUT_SHARE = 0.4
 """Share of the held-out excess that a model must remove where there is one."""
@@ -28,10 +38,29 @@ second fit and no more.
 
 
 @dataclass(frozen=True)
+class Untaught:
+    """Parameters that these episodes feel and the fitted ones do not: those of a wall that no fitted shot met.
+
+    What a model says of them is the cell's guess, and no model is to blame for it.
+    """
+
+    which: Ints
+    """(k,) indices."""
+    steps: Floats
+    """(k,) for differences, in prior widths."""
+
+    def beside(self, fit: Fit) -> Untaught:
+        """Those that a fit leaves as they are."""
+        kept = ~np.isin(self.which, fit.free)
+        return Untaught(self.which[kept], self.steps[kept])
+
+
+@dataclass(frozen=True)
 class HeldOut:
     """Episodes that were never fitted, weighted as the fitted ones are."""
 
     likelihood: Likelihood
+    untaught: Untaught
     before: float
     """Surprise by the model without effects."""
     floor: float
@@ -46,7 +75,7 @@ class HeldOut:
     def surprise(self, joint: Joint) -> float:
         """Minus the log predictive density of a fitted model; rolled out once for each."""
         if joint not in self._asked:
-            self._asked[joint] = surprise(self.likelihood, joint.likelihood, joint.fit)
+            self._asked[joint] = surprise(self.likelihood, joint.likelihood, joint.fit, self.untaught)
         return self._asked[joint]
 
     def share(self, joint: Joint) -> float:
@@ -82,29 +111,45 @@ def unexpected(judge: Likelihood, refined: Refined) -> bool:
 
 def held_out(judge: Likelihood, fitted: Likelihood, fit: Fit) -> HeldOut:
     """Weigh held-out episodes: frames that the parameters move too much are trusted less, as in the fit."""
-    linear = linearise(judge, with_launches(judge, fit.point.values), fit.free, difference_steps(fit.linear))
+    untaught = _untaught(judge, fitted, fit)
+    point = with_launches(judge, fit.point.values, untaught.which, untaught.steps)
+    linear = linearise(judge, point, fit.free, difference_steps(fit.linear))
     calm = calmed(judge, linear)
     floor = noise_cost(calm, replace(fit, free=np.zeros(0, dtype=np.int64)))
-    return HeldOut(calm, surprise(calm, fitted, fit), floor)
+    return HeldOut(calm, untaught, surprise(calm, fitted, fit, untaught), floor)
 
 
-def surprise(unseen: Likelihood, fitted: Likelihood, fit: Fit) -> float:
+def _untaught(judge: Likelihood, fitted: Likelihood, fit: Fit) -> Untaught:
+    influence = sensitivity(judge, with_launches(judge, fit.point.values))
+    here = influence.felt(np.sqrt(2 * HELD_OUT_SEEN), FELT_SHARE)  # a prior width of these can be judged at all
+    here = np.setdiff1d(here, fit.free)
+    there = linearise(fitted, fit.point, here, np.full(len(here), COARSE))
+    which = here[np.sqrt(np.sum(there.jacobian**2, axis=(0, 1, 2))) < FELT]
+    return Untaught(which, influence.steps[which])
+
+
+def surprise(unseen: Likelihood, fitted: Likelihood, fit: Fit, untaught: Untaught) -> float:
     """Minus the log predictive density of unseen episodes, up to a constant: noise and the fit's own uncertainty.
 
     A model that is unsure what its parameters are may be wrong about an episode without being refuted by it: the
-    residual has the covariance 1 + J C J', C that of the fitted parameters. Launches that the cell does not know are
-    as likely as the cell says, and the volume that they take, the same for every model, is left out; that of a scatter
-    which the model adds is not. Outliers are weighed down as in the fit.
+    residual has the covariance 1 + J C J', C that of the fitted parameters and of those `untaught`, which are fitted
+    here. These, and launches that the cell does not know, are as likely as the cell says, and the volume that they
+    take, the same for every model, is left out; that of a scatter which the model adds is not. Outliers are weighed
+    down as in the fit.
     """
-    judged = fitted.on(unseen)
-    point = with_launches(judged, fit.point.values)
-    linear = linearise(judged, point, fit.free, difference_steps(fit.linear))
-    p, random = len(fit.free), judged.launch_std > 0
+    judged, untaught = fitted.on(unseen), untaught.beside(fit)
+    point = with_launches(judged, fit.point.values, untaught.which, untaught.steps)
+    free = np.concatenate([fit.free, untaught.which])
+    steps = np.concatenate([difference_steps(fit.linear), untaught.steps])
+    linear = linearise(judged, point, free, steps)
+    taught, p, random = len(fit.free), len(free), judged.launch_std > 0
     own = block_diag(*linear.launch_jacobian.reshape(len(judged.inputs), judged.measured[0].size, -1))
     residual, jacobian = linear.residual.ravel(), np.hstack([linear.jacobian.reshape(-1, p), own])
     precision = np.eye(jacobian.shape[1])
-    precision[:p, :p] = np.linalg.inv(covariance(fitted, fit)[:p, :p])
-    away = np.concatenate([np.zeros(p), (point.launch[:, random] / judged.launch_std[random]).ravel()])
+    precision[:taught, :taught] = np.linalg.inv(covariance(fitted, fit)[:taught, :taught])
+    moved = (point.values - judged.prior_mean)[untaught.which] / judged.prior_std[untaught.which]
+    launched = (point.launch[:, random] / judged.launch_std[random]).ravel()
+    away = np.concatenate([np.zeros(taught), moved, launched])
     left, weight = residual, np.ones_like(residual)
     for _ in range(3):
         weight = robust_weight(left, ROBUST)
@@ -112,7 +157,8 @@ def surprise(unseen: Likelihood, fitted: Likelihood, fit: Fit) -> float:
         move = -np.linalg.solve(inner, jacobian.T @ (weight * residual) + away)
         left = residual + jacobian @ move
     loss = 0.5 * float(np.sum(robust_loss(left, ROBUST)))
-    same = p + np.flatnonzero(np.tile(np.cumsum(random[random]) <= np.sum(unseen.launch_std > 0), len(judged.inputs)))
+    of_cell = np.tile(np.cumsum(random[random]) <= np.sum(unseen.launch_std > 0), len(judged.inputs))
+    same = np.concatenate([np.arange(taught, p), p + np.flatnonzero(of_cell)])
     common = inner[np.ix_(same, same)]
     volume = np.linalg.slogdet(inner)[1] - np.linalg.slogdet(common)[1] - np.linalg.slogdet(precision)[1]
     return loss + 0.5 * float((away + move) @ precision @ (away + move)) + 0.5 * float(volume)

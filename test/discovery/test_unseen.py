@@ -20,8 +20,8 @@ from compass_ros.pipeline import pose
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.simulation.replay import Recordings
-from test.discovery.planted import HELD_OUT, PUCKS, joint, recorded, space_of
-from test.simulation.table import simulator
+from test.discovery.planted import HELD_OUT, PUCKS, SIGMA, joint, recorded, space_of
+from test.simulation.table import cell, simulator
 
 RIVALS = (Attached(EFFECTS["magnus"], PUCKS), Attached(EFFECTS["quadratic_drag"], PUCKS))
 PENDULUM = load(Path(__file__).parents[2] / "examples" / "own_cell" / "pendulum.yaml")
@@ -34,6 +34,24 @@ def test_only_shots_on_another_table_are_unexpected() -> None:
     assert refined.chi_square < 1.2
     assert not unexpected(recorded(None, [], HELD_OUT, 1), refined)
     assert unexpected(recorded(DRAG, [0.3], HELD_OUT, 1), refined)
+
+
+def test_a_wall_that_no_fitted_shot_met_is_held_against_no_model() -> None:
+    """One held-out shot meets the back wall, whose damping is another; of the bar, the fitted shots knew."""
+    space = space_of(recorded(None, []))
+    back, bar = (held_out(damped(name), space.likelihood, space.fit) for name in ("back_wall", "obstacle"))
+    for unseen in (back, bar):
+        assert [cell().parameters[i].name for i in unseen.untaught.which] == ["back_wall@dyna@damping"]
+    assert back.excess < HELD_OUT_SEEN
+    assert bar.excess > 20 * HELD_OUT_SEEN
+
+
+def damped(name: str) -> Likelihood:
+    """The held-out shots on a table where one thing springs back harder."""
+    clean = recorded(None, [], HELD_OUT)
+    values = np.tile(cell().values({f"{name}@dyna@damping": -6.0}), (len(HELD_OUT), 1))
+    measured = simulator().observe(values, HELD_OUT, clean.time_s)
+    return replace(clean, measured=measured + np.random.default_rng(1).normal(0, SIGMA, measured.shape))
 
 
 def test_what_predicts_only_a_part_helps_and_is_not_named() -> None:

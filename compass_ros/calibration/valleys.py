@@ -1,0 +1,57 @@
+"""Directions in which parameters cancel, asked of the simulator itself.
+
+A puck's damping and those of all walls that it meets add up; one may grow for the others. Differences of each parameter
+alone are exact to the simulator's roughness, and where large ones cancel, that roughness is what is left: it looks like
+information, pins the parameters where they happen to stand, and makes their error bars too small.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from compass_ros.calibration.least_squares import Linear, Point, cost, moved, robust_weight
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.types import Floats, Ints
+
+CANCELS = 0.1
+"""Movement along a direction, as a share of what its parameters would do if they did not cancel."""
+ROUNDS = 2
+"""How often directions are asked: the first step is short where roughness has passed for information."""
+
+
+def along_valleys(likelihood: Likelihood, point: Point, linear: Linear, free: Ints, robust: float) -> Linear:
+    """Differences with those along cancelling directions measured over a standard deviation to each side.
+
+    The rest stays as it is (Broyden 1965, with a measured secant for each direction).
+    """
+    p = len(free)
+    jacobian = linear.jacobian.reshape(-1, p).copy()
+    weight = robust_weight(linear.residual, robust).reshape(-1, 1)
+    for _ in range(ROUNDS):
+        directions = _valleys((jacobian * weight).T @ jacobian)
+        if not len(directions):
+            break
+        launches = np.zeros(linear.launch_jacobian.shape[0] * linear.launch_jacobian.shape[-1])
+        sides = [moved(likelihood, point, free, np.concatenate([s, launches])) for d in directions for s in (d, -d)]
+        residuals = cost(likelihood, sides, robust)[1].reshape(len(directions), 2, -1)
+        for (up, down), (there, back) in zip(residuals, _pairs(sides), strict=True):
+            secant = (there.values[free] - back.values[free]) / likelihood.prior_std[free]
+            length = float(secant @ secant)
+            if length > 0:
+                jacobian += np.outer(up - down - jacobian @ secant, secant) / length
+    return replace(linear, jacobian=jacobian.reshape(linear.jacobian.shape))
+
+
+def _valleys(gram: Floats) -> Floats:
+    """(d, p) directions in which the parameters cancel, each a posterior standard deviation long."""
+    information, vectors = np.linalg.eigh(gram)
+    information = np.maximum(information, 0.0)
+    apart = np.sum(vectors**2 * np.diag(gram)[:, None], axis=0)
+    cancel = (information < CANCELS**2 * apart) & (apart > 1.0)
+    return np.asarray((vectors[:, cancel] / np.sqrt(1 + information[cancel])).T)
+
+
+def _pairs(sides: list[Point]) -> list[tuple[Point, Point]]:
+    return list(zip(sides[::2], sides[1::2], strict=True))
