@@ -333,14 +333,6 @@ def test_a_table_of_no_results_is_one_line(tmp_path: Path, refused: Callable[...
     assert f"{nowhere}: no results" in refused("prove", "--table", "--out", nowhere)
 
 
-def test_the_table_of_the_proof_says_its_units(run: Run) -> None:
-    proof = Path(__file__).parents[1] / "proof"
-    status, out, _ = run("prove", "--table", "--out", proof / "results.jsonl", "--rivals-out", proof / "rivals.jsonl")
-    assert status == 0
-    assert "median [s]" in " ".join(out.replace("│", " ").split())
-    assert "held out [mm]" in " ".join(out.replace("┃", " ").split())
-
-
 def test_a_cut_bag_is_made_whole(good: Path, tmp_path: Path, run: Run) -> None:
     bag = cut_off(good, tmp_path)
     status, out, _ = run("record", "--recover", bag)

@@ -29,14 +29,14 @@ def along_valleys(likelihood: Likelihood, point: Point, linear: Linear, free: In
     p = len(free)
     jacobian = linear.jacobian.reshape(-1, p).copy()
     weight = robust_weight(linear.residual, robust).reshape(-1, 1)
+    launches = np.zeros(linear.launch_jacobian.shape[0] * linear.launch_jacobian.shape[-1])  # stay where they are
     for _ in range(ROUNDS):
         directions = _valleys((jacobian * weight).T @ jacobian)
         if not len(directions):
             break
-        launches = np.zeros(linear.launch_jacobian.shape[0] * linear.launch_jacobian.shape[-1])
         sides = [moved(likelihood, point, free, np.concatenate([s, launches])) for d in directions for s in (d, -d)]
         residuals = cost(likelihood, sides, robust)[1].reshape(len(directions), 2, -1)
-        for (up, down), (there, back) in zip(residuals, _pairs(sides), strict=True):
+        for (up, down), there, back in zip(residuals, sides[::2], sides[1::2], strict=True):
             secant = (there.values[free] - back.values[free]) / likelihood.prior_std[free]
             length = float(secant @ secant)
             if length > 0:
@@ -51,7 +51,3 @@ def _valleys(gram: Floats) -> Floats:
     apart = np.sum(vectors**2 * np.diag(gram)[:, None], axis=0)
     cancel = (information < CANCELS**2 * apart) & (apart > 1.0)
     return np.asarray((vectors[:, cancel] / np.sqrt(1 + information[cancel])).T)
-
-
-def _pairs(sides: list[Point]) -> list[tuple[Point, Point]]:
-    return list(zip(sides[::2], sides[1::2], strict=True))

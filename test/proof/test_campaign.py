@@ -15,6 +15,7 @@ from compass_ros.proof.lines import Key
 from compass_ros.proof.one_world import SUITES
 from compass_ros.proof.page import BEGIN, END, write_page
 from compass_ros.proof.statistics import table
+from test.conftest import Run
 
 PLAN = Plan(("main",), worlds=3)
 SEEDS = [SUITES["main"].first_seed + i for i in range(3)]
@@ -213,3 +214,11 @@ def test_the_page_keeps_its_text_and_lists_what_was_wrong(tmp_path: Path) -> Non
     page.write_text("no markers")
     with pytest.raises(ConfigError, match="expected the markers"):
         write_page(page, [])
+
+
+def test_the_table_of_the_proof_says_its_units(run: Run) -> None:
+    proof = Path(__file__).parents[2] / "proof"
+    status, out, _ = run("prove", "--table", "--out", proof / "results.jsonl", "--rivals-out", proof / "rivals.jsonl")
+    assert status == 0
+    assert "median [s]" in " ".join(out.replace("│", " ").split())
+    assert "held out [mm]" in " ".join(out.replace("┃", " ").split())
