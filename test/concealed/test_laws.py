@@ -85,6 +85,8 @@ def _library(name: str, own: Ingredient, base: Played) -> Floats:
         terms = dict(zip(FORMS[name].names, along(own, own, FORMS[name], table(), played)[0], strict=True))
     if name == "lens_distortion":
         terms = {"k1": 0.05 * own.size * own.shape["hand"]}
+    if name == "off_centre_mass":
+        terms["arm"] = 0.0  # with the formula of the library the lump's inertia is left out
     numbers = np.array([[terms[q.name] for q in effect.quantities]] * len(INPUTS))
     if name == "stroke_jitter":
         numbers = np.array([[0.005 * own.size * own.shape[f"shot_{i}"]] for i in range(len(INPUTS))])

@@ -74,7 +74,16 @@ class Effect:
     """Name of the simpler effect that it comes to at an end of its shapes' ranges; empty: none."""
 
 
-RESTORED = ("geom_pos", "geom_quat", "geom_sameframe", "geom_solref", "body_ipos", "body_sameframe", "pair_solref")
+RESTORED = (
+    "geom_pos",
+    "geom_quat",
+    "geom_sameframe",
+    "geom_solref",
+    "body_inertia",
+    "body_ipos",
+    "body_sameframe",
+    "pair_solref",
+)
 """Arrays of a model that effects may change, beside the friction cone in its options."""
 
 

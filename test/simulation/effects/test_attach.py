@@ -65,7 +65,7 @@ def test_every_array_of_the_model_is_as_before() -> None:
     model = copy.copy(simulator().physics.model)
     before = {n: getattr(model, n).copy() for n in dir(model) if isinstance(getattr(model, n), np.ndarray)}
     given = (
-        exported("off_centre_mass", (0.002, 0.001), ("puck1",)).effects
+        exported("off_centre_mass", (0.002, 0.001, 0.01), ("puck1",)).effects
         + exported("local_wall", (0.01, -0.4), ("left_wall",)).effects
     )
     attachment = attach(model, mujoco.MjData(model), Exported(given, {}))

@@ -135,11 +135,12 @@ def test_one_wall_alone_changes() -> None:
     assert model.geom("obstacle").pos[0] == 0.1
 
 
+@pytest.mark.parametrize("arm", [0.0, 0.02])
 @pytest.mark.parametrize(("place", "sign"), [((0.0, 0.003), 1.0), ((0.0, -0.003), -1.0)])
-def test_a_push_beside_the_centre_of_mass_turns_the_puck(place: tuple[float, float], sign: float) -> None:
+def test_a_push_beside_the_centre_of_mass_turns_the_puck(place: tuple[float, float], sign: float, arm: float) -> None:
     """A straight push along x through the centre of the rim: spin = offset x momentum / inertia."""
     heavy = Simulator(cell(), [Attached(EFFECTS["off_centre_mass"], ("puck1",))], threads=1)
-    given = np.concatenate([values()[0], place])
+    given = np.concatenate([values()[0], place, [arm]])
     time = np.linspace(0.0, 0.4, 401)
     puck = heavy.bodies(given, np.array([-0.24, 0.0, 0.0, 0.5]), time)["puck1"]
     rate, speed = np.gradient(puck[:, 2], time)[-1], np.gradient(puck[:, 0], time)
@@ -147,14 +148,15 @@ def test_a_push_beside_the_centre_of_mass_turns_the_puck(place: tuple[float, flo
     turning = np.gradient(puck[:, 2], time)[strike]
     assert np.sign(rate) == sign
     centre_speed = speed[strike] - turning * place[1]  # of the centre of mass
-    assert turning == pytest.approx(place[1] * MASS * centre_speed / INERTIA, rel=0.05)
+    inertia = INERTIA + MASS * 0.003 * arm
+    assert turning == pytest.approx(place[1] * MASS * centre_speed / inertia, rel=0.05)
 
 
 def test_a_mass_that_mujoco_compiled_as_centred_cannot_be_moved() -> None:
     model = wall()
     with pytest.raises(ConfigError, match="compiled it as centred for good"):
-        attach(model, mujoco.MjData(model), exported("off_centre_mass", (0.001, 0.0)))
-    attach(model, mujoco.MjData(model), exported("off_centre_mass", (0.0, 0.0))).detach()
+        attach(model, mujoco.MjData(model), exported("off_centre_mass", (0.001, 0.0, 0.0)))
+    attach(model, mujoco.MjData(model), exported("off_centre_mass", (0.0, 0.0, 0.01))).detach()
 
 
 def test_the_other_friction_cone_changes_contacts_with_friction() -> None:
