@@ -24,9 +24,9 @@ EQUAL = 3.0
 """Log evidence within which two effects are told apart by nothing."""
 EQUAL_SHARE = 0.015
 """The same as a share of the excess: functional forms are never exactly right."""
-NEEDED, SEEN = 0.05, 0.04
-"""Share of the excess that an effect must be worth beside another that is enough; or the excess of chi-square that the
-other leaves."""
+SEEN = 0.04
+"""Excess of chi-square that an effect which is enough must leave for another to be looked for beside it: less, 0.2 of
+the noise, is what its form gets wrong, and many a second effect would take some of that."""
 LEADS = 0.6
 """Share from which the best effect is surely one of two; below, the second best may be instead."""
 NEARLY = 0.85
@@ -120,6 +120,8 @@ def _in_pairs(choice: Choice, space: Space, candidates: Sequence[Candidate], uns
         return choice
     led, choice = pairs[0], _with_each(pairs[0], choice, space)
     if not choice.good(unseen) and not _surely(choice, pairs, unseen):
+        pairs += _with_a_rate(different(choice.singles)[0], candidates, slight)
+    if not choice.good(unseen) and not _surely(choice, pairs, unseen):
         pairs += _with_contacts(different(choice.singles)[0], candidates, slight)
         if not _surely(choice, pairs, unseen):
             second = next(j for j in choice.singles if j.added == led.added[1:])
@@ -212,7 +214,7 @@ def simplest(good: Sequence[Joint]) -> Joint:
 def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
     """The same with a second effect where the first leaves something, and that has a cause of its own."""
     first = choice.singles[0]
-    if 1 - choice.share(first) < NEEDED and choice.remainder(first) < SEEN:
+    if choice.remainder(first) < SEEN:
         return choice
     slight = SLIGHT * choice.excess
     pairs = _pairs([first], candidates, slight)
@@ -228,8 +230,7 @@ def _beside(first: Joint, pairs: Sequence[Joint], choice: Choice, unseen: HeldOu
     """The same with the best of some pairs with the first effect, and whether there are two."""
     pair = max(pairs, key=lambda p: evidence(p, unseen))
     choice = replace(choice.shown_by(pair), pair=pair)
-    needed = choice.share(pair) - choice.share(first) > NEEDED or choice.remainder(first) > SEEN
-    predicts = unseen.beside(first).helps(pair)
+    needed, predicts = choice.remainder(first) > SEEN, unseen.beside(first).helps(pair)
     return replace(choice, two=predicts and needed and choice.explains(pair, first))
 
 
@@ -257,15 +258,27 @@ def _pairs(firsts: Sequence[Joint], candidates: Sequence[Candidate], slight: flo
     """
     found: list[Joint] = []
     for first in firsts:
-        own = {a.effect.name for a in first.added}
-        others = [c for c in candidates if c.name not in own]
-        there, scores = screen(first.simulator, first.likelihood, first.fit, others)
+        there, scores = _beyond(first, candidates)
         for sketch in sketched(there, scores)[:TRIED]:
             joint = further(sketch, slight, 4)
             found.append(replace(joint, added=(*first.added, *joint.added)))
     best = sorted((further(j, slight, 5) for j in sorted(found, key=worth)[:3]), key=worth)
     close = [j for j in best[:2] if worth(j) - worth(best[0]) < max(OF_LIMIT, CLOSE * slight)]
     return sorted((converge(j, slight) for j in close), key=worth)
+
+
+def _beyond(first: Joint, candidates: Sequence[Candidate]) -> tuple[Space, list[Score]]:
+    """What one effect leaves, and what the other candidates promise there."""
+    own = {a.effect.name for a in first.added}
+    others = [c for c in candidates if c.name not in own]
+    return screen(first.simulator, first.likelihood, first.fit, others)
+
+
+def _with_a_rate(first: Joint, candidates: Sequence[Candidate], slight: float) -> list[Joint]:
+    """A fit of one effect with one that has a frequency, from the first guess: alone, it had bent the parameters."""
+    there, scores = _beyond(first, candidates)
+    other = at_other_rates(there, scores)
+    return [replace(converge(other, slight), added=(*first.added, *other.added))] if other else []
 
 
 def _with_contacts(first: Joint, candidates: Sequence[Candidate], slight: float) -> list[Joint]:

@@ -137,9 +137,11 @@ def finished(joint: Joint) -> Joint:
 
 
 def from_first_guess(space: Space, attached: Attached, numbers: Floats) -> Joint:
-    """A fit that begins at the cell's first guess with the (q,) numbers of an effect."""
+    """A fit that begins at the cell's first guess with the (q,) numbers of an effect, and of those that are there."""
     simulator, likelihood = widened(space.simulator, space.likelihood, (attached,))
     values = likelihood.prior_mean.copy()
+    there = np.arange(len(simulator.cell.parameters), len(space.fit.point.values))
+    values[there] = space.fit.point.values[there]
     values[-len(numbers) :] = numbers
     return Joint(simulator, likelihood, _grown(simulator, likelihood, values, space.fit.robust), (attached,))
 

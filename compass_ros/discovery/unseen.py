@@ -25,8 +25,8 @@ from compass_ros.types import Floats, Ints
 
 HELD_OUT_SHARE = 0.4
 """Share of the held-out excess that a model must remove where there is one."""
-HELD_OUT_SEEN = 15.0
-"""Held-out excess [log likelihood] from which it can be judged at all."""
+HELD_OUT_SEEN, BEYOND_SCATTER = 15.0, 2.0
+"""Held-out excess from which it can be judged at all: log likelihood, and standard deviations of what noise makes."""
 FLOOR = 1.2
 """Chi-square of a fit that leaves nothing to find in the episodes it was fitted to."""
 UNEXPECTED = 0.05
@@ -72,6 +72,11 @@ class HeldOut:
         """Surprise beyond that by noise alone."""
         return self.before - self.floor
 
+    @property
+    def seen(self) -> float:
+        """Excess from which it can be judged: half the chi-square of N white values scatters by sqrt(N / 2)."""
+        return max(HELD_OUT_SEEN, BEYOND_SCATTER * float(np.sqrt(0.5 * self.likelihood.measurements)))
+
     def surprise(self, joint: Joint) -> float:
         """Minus the log predictive density of a fitted model; rolled out once for each."""
         if joint not in self._asked:
@@ -80,7 +85,7 @@ class HeldOut:
 
     def share(self, joint: Joint) -> float:
         """Part of the held-out excess that a model removes; 1 where there is none to speak of."""
-        return (self.before - self.surprise(joint)) / self.excess if self.excess > HELD_OUT_SEEN else 1.0
+        return (self.before - self.surprise(joint)) / self.excess if self.excess > self.seen else 1.0
 
     def remainder(self, joint: Joint) -> float:
         """Excess of chi-square that a model leaves in these episodes."""
@@ -88,7 +93,7 @@ class HeldOut:
 
     def helps(self, joint: Joint) -> bool:
         """Whether a model predicts these episodes better: clearly, where there is something to gain."""
-        if self.excess > HELD_OUT_SEEN:
+        if self.excess > self.seen:
             return self.share(joint) > HELD_OUT_SHARE
         return self.before - self.surprise(joint) > -5.0
 

@@ -12,7 +12,7 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import refine
 from compass_ros.cells import load
-from compass_ros.discovery.choice import Choice
+from compass_ros.discovery.choice import PREDICTS, Choice
 from compass_ros.discovery.choose import simplest
 from compass_ros.discovery.joint import Joint
 from compass_ros.discovery.unseen import HELD_OUT_SEEN, held_out, unexpected
@@ -72,6 +72,19 @@ def test_what_predicts_only_a_part_helps_and_is_not_named() -> None:
     foretells = costing(joint(space, RIVALS[1], [0.5]), 900.0)
     assert unseen.share(foretells) > unseen.share(half)
     assert not replace(choice, singles=(half, weak[0], foretells)).nameable(half, unseen), "another predicts more"
+
+
+def test_an_excess_that_noise_may_have_made_refutes_nothing() -> None:
+    space = space_of(recorded(DRAG, [0.3]))
+    unseen = held_out(recorded(DRAG, [0.3], HELD_OUT, 1), space.likelihood, space.fit)
+    weak, scatter = joint(space, DRAG, [0.15]), np.sqrt(unseen.likelihood.measurements / 2)
+    before = unseen.surprise(weak) + 1.0
+    beyond, within = (replace(unseen, before=before, floor=before - times * scatter) for times in (3.0, 1.5))
+    assert 0 < beyond.share(weak) < PREDICTS
+    assert not beyond.helps(weak)
+    assert within.excess > HELD_OUT_SEEN
+    assert within.share(weak) == 1.0
+    assert within.helps(weak)
 
 
 def test_a_wind_so_fast_that_it_is_a_tilt_is_no_rival_of_the_tilt() -> None:
