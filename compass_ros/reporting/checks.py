@@ -27,6 +27,8 @@ OVERFIT = 1.3
 """Held-out error over fitted error from which the fit does not carry over fully."""
 BOUND_SHARE = 0.01
 """A value nearer to a bound than this share of the range counts as stuck there."""
+WORSE = 1.05
+"""Held-out error with the effects over the one without from which they predict worse, not just the same."""
 NAMES_SHOWN = 4
 
 ORDER: tuple[Level, ...] = ("good", "note", "care", "bad")
@@ -57,6 +59,7 @@ def assess(result: Result) -> tuple[Check, ...]:
         *_identifiable(result),
         *_at_bounds(result),
         *_verdict(result),
+        *_effects_predict(result),
         *(Check("care", "Warning", warning) for warning in result.warnings),
         *_blind_spots(result),
     )
@@ -157,6 +160,15 @@ def _verdict(result: Result) -> Iterator[Check]:
         detail += f" Probability of a false alarm: {probability(p)}."
         level = "care" if level == "good" and p > 0.05 else level
     yield Check(level, VERDICT_TITLE[verdict], detail)
+
+
+def _effects_predict(result: Result) -> Iterator[Check]:
+    without, within = held_out_rmse(result, "calibrated"), held_out_rmse(result, "with_effects")
+    if within > WORSE * without:
+        errors = [with_unit(error, result.unit) for error in (without, within)]
+        numbers = f"Held-out error {errors[0]} without it, {errors[1]} with it."
+        detail = f"{numbers} The evidence weighs every frame by its noise, this error does not. Record more episodes."
+        yield Check("care", "What was named does not predict better", detail)
 
 
 def _blind_spots(result: Result) -> Iterator[Check]:

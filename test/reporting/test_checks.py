@@ -63,6 +63,12 @@ def test_the_best_model_is_judged(clean: Result) -> None:
     assert "At the noise floor" in titles(result, "good")
 
 
+@pytest.mark.parametrize(("held_out", "warned"), [(1.4, False), (1.5, True)])
+def test_an_effect_that_predicts_worse(clean: Result, held_out: float, warned: bool) -> None:
+    result = with_gap(clean, nominal=(50.0, 50.0), calibrated=(1.4, 1.4), with_effects=(1.2, held_out))
+    assert ("What was named does not predict better" in titles(result, "care")) == warned
+
+
 def test_nothing_held_out(clean: Result) -> None:
     assert "Nothing held out" in titles(replace(clean, held_out=()), "bad")
 
