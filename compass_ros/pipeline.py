@@ -62,9 +62,11 @@ def calibrate(
             found = not_evaluated("it was switched off")
             break
         refined = refined or refine(problem.likelihood, estimate.values)
-        if turn or len(used) < 2 * len(held_out) or not (held_out and unexpected(unseen, refined)):
+        may_turn = turn == 0 and 0 < 2 * len(held_out) <= len(used)
+        if not (may_turn and unexpected(unseen, refined)):
             found = discover(simulator, refined, unseen, noise, config.seed, report)
-            break
+            if not (may_turn and found.untaught):
+                break
         told.append(
             f"what fits the other episodes to the noise does not predict {', '.join(judge.names)}: these are fitted, "
             "others are held out"

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from compass_ros import pipeline
 from compass_ros.calibration.noise import Noise, measure_noise
 from compass_ros.cells import load
 from compass_ros.config import CalibrationConfig
@@ -150,6 +151,21 @@ def test_the_values_of_the_truth_reach_the_noise_floor(episodes: list[Episode], 
     """The gap that is reported is zero but for noise where nothing is wrong: a check of the yardstick itself."""
     at_truth = Replay(simulator(), recordings(cell(), episodes)).gap(values(TRUTH)[0])
     assert at_truth.rmse_m == pytest.approx(result.noise_floor_m, rel=0.1)
+
+
+def test_what_the_fitted_episodes_do_not_show_is_fitted_next(
+    episodes: list[Episode], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once: a verdict that comes to the same again stands."""
+    monkeypatch.setattr(pipeline, "refine", lambda *_: None)
+    monkeypatch.setattr(pipeline, "unexpected", lambda *_: False)
+    monkeypatch.setattr(pipeline, "discover", lambda *_: replace(not_evaluated("a test"), untaught=True))
+    result, _ = calibrate(episodes, cell(), replace(CONFIG, discover=True))
+    first, second = (split(episodes, CONFIG, turn)[1] for turn in (0, 1))
+    assert result.held_out == tuple(e.name for e in second)
+    assert set(result.held_out).isdisjoint(e.name for e in first)
+    names = ", ".join(e.name for e in first)
+    assert any(f"does not predict {names}: these are fitted, others are held out" in w for w in result.warnings)
 
 
 def test_a_stop_is_said(episodes: list[Episode]) -> None:

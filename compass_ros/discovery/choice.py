@@ -77,6 +77,16 @@ class Choice:
         """
         return self.remainder(pair) < FORM_LEFT * self.remainder(first)
 
+    def verdict(self, unseen: HeldOut) -> Joint | None:
+        """The model that is to be named: of one effect or of two; None where none may be."""
+        if self.two and self.pair is not None:
+            return self.pair
+        best = self.singles[0] if self.singles else None
+        if best is not None and self.nameable(best, unseen):
+            return best
+        needed = self.pair is not None and best is not None and self.explains(self.pair, best)
+        return self.pair if self.pair is not None and needed and self.nameable(self.pair, unseen) else None
+
     def good(self, unseen: HeldOut) -> list[Joint]:
         """Models of one effect that may be named, the best first."""
         good = [j for j in self.singles[:LEADERS] if self.nameable(j, unseen)]
@@ -88,6 +98,15 @@ class Choice:
         predicts = share >= PREDICTS or (share >= FORM_SHARE and unseen.remainder(joint) < SMALL)
         clear = self.share(joint) > CLEAR and self._alone(joint) and self._foremost(joint, unseen)
         return self.enough(joint) and unseen.helps(joint) and (predicts or clear) and not joint.stands_in
+
+    def untaught(self, unseen: HeldOut) -> bool:
+        """Whether a model leaves nothing of the fitted episodes and fails on the others.
+
+        They have something then that no fitted one shows.
+        """
+        models = [*self.singles, *([self.pair] if self.pair else [])]
+        complete = [j for j in models if self.enough(j) and self.remainder(j) < SMALL]
+        return bool(complete) and not any(unseen.helps(j) for j in complete)
 
     def enough(self, joint: Joint) -> bool:
         """Whether a model explains what there is to explain."""

@@ -11,7 +11,7 @@ from compass_ros.calibration.least_squares import Point, minimise
 from compass_ros.discovery.beginning import begun, in_place_of
 from compass_ros.discovery.candidates import Candidate, scattered
 from compass_ros.discovery.choice import CLEAR, LEADERS, OF_LIMIT, PREDICTS, Choice, comes_to, evidence, undecided
-from compass_ros.discovery.joint import Joint, converge, finished, from_second_start, widened
+from compass_ros.discovery.joint import Joint, converge, finished, from_first_guess, from_second_start, widened, widths
 from compass_ros.discovery.scatter import fit_scattered, follows_command, settled_scatter
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import screen
@@ -35,6 +35,8 @@ CLOSE = 4.0
 """How far behind the best pair a second one may be to be followed too, in steps that promise SLIGHT."""
 OF_CONTACTS, FOLLOWED = (0.06, 0.5), 2
 """Sizes from which effects of contacts are followed beside another effect, in their scale; how many to the end."""
+WIDTHS = (1.0, 0.5)
+"""Widths of fields that are tried where two effects meet, as parts of those that each has alone."""
 SLIGHT = 0.005
 """Share of the excess that a further step of a fit must promise: models are compared by shares of it."""
 
@@ -76,11 +78,11 @@ def choose(
         choice = _tried(choice, [[converge(other, slight)]], unseen)
     if not first and not choice.good(unseen):
         choice = _tried(choice, beginnings, unseen)
-    if not choice.good(unseen):
-        choice = _with_scatter(choice, space, unseen)
     if choice.good(unseen):
         return _concluded(choice, space, candidates, unseen)
-    return _in_pairs(choice, space, candidates, unseen) if choice.singles else choice
+    if choice.singles and not choice.untaught(unseen):
+        choice = _in_pairs(choice, space, candidates, unseen)
+    return choice if choice.verdict(unseen) else _with_scatter(choice, space, candidates, unseen)
 
 
 def _tried(choice: Choice, more: Iterable[list[Joint]], unseen: HeldOut) -> Choice:
@@ -94,10 +96,11 @@ def _tried(choice: Choice, more: Iterable[list[Joint]], unseen: HeldOut) -> Choi
     return choice
 
 
-def _with_scatter(choice: Choice, space: Space, unseen: HeldOut) -> Choice:
+def _with_scatter(choice: Choice, space: Space, candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
     """The same with what differs from episode to episode by chance, where that explains what no law does.
 
-    It has no functional form that could be wrong: it explains all or is not there. No pair is made of it.
+    It has no functional form that could be wrong: it explains all or is not there. Asked last, for a number for each
+    episode would stand for two laws as well. No pair is made of it.
     """
     for candidate in scattered(space.simulator):
         joint = fit_scattered(space, candidate, SLIGHT * choice.excess)
@@ -106,7 +109,7 @@ def _with_scatter(choice: Choice, space: Space, unseen: HeldOut) -> Choice:
         joint = settled_scatter(joint)
         judged = choice.of([joint, *choice.singles])
         if judged.share(joint) > CLEAR and judged.nameable(joint, unseen):
-            return judged
+            return _concluded(judged, space, candidates, unseen)
     return choice
 
 
@@ -118,6 +121,8 @@ def _in_pairs(choice: Choice, space: Space, candidates: Sequence[Candidate], uns
     pairs = _pairs(firsts, candidates, slight)
     if not pairs:
         return choice
+    if not _surely(choice, pairs, unseen):
+        pairs = sorted([*pairs, *_of_singles(choice, space, slight)], key=worth)
     led, choice = pairs[0], _with_each(pairs[0], choice, space)
     if not choice.good(unseen) and not _surely(choice, pairs, unseen):
         pairs += _with_a_rate(different(choice.singles)[0], candidates, slight)
@@ -134,6 +139,24 @@ def _in_pairs(choice: Choice, space: Space, candidates: Sequence[Candidate], uns
     if pair.fit.point.cost < min(j.fit.point.cost for j in choice.singles):
         choice = choice.shown_by(pair)
     return replace(choice, pair=pair)
+
+
+def _of_singles(choice: Choice, space: Space, slight: float) -> list[Joint]:
+    """The best effect with the best other force and the best that is none, as they stand alone, from the first guess.
+
+    Where two effects are large, the parameters bend for the one that is not there, and from there its like is not seen.
+    A field has grown wide to stand for both.
+    """
+    best, *others = different(choice.singles)
+    kinds = [[j for j in others if Candidate(j.added[0]).by_force == by_force] for by_force in (True, False)]
+    found = []
+    for other in (of_kind[0] for of_kind in kinds if of_kind):
+        added = (*best.added, *other.added)
+        numbers = np.concatenate([j.fit.point.values[len(space.fit.point.values) :] for j in (best, other)])
+        lengths = widths([q for attached in added for q in attached.effect.quantities])
+        starts = [np.where(lengths > 0, np.maximum(lengths, width * numbers), numbers) for width in WIDTHS]
+        found += [from_first_guess(space, added, start) for start in (starts if lengths.any() else starts[:1])]
+    return [converge(j, slight) for j in sorted(found, key=worth)[:1]]
 
 
 def _with_each(pair: Joint, choice: Choice, space: Space) -> Choice:

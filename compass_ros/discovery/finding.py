@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -58,6 +58,8 @@ class Discovery:
     before: TableMap | None = None
     after: TableMap | None = None
     warnings: Sequence[str] = ()
+    untaught: bool = False
+    """What leaves nothing of the fitted episodes fails on the others: they have something that no fitted one shows."""
 
 
 def not_evaluated(reason: str) -> Discovery:
@@ -101,16 +103,10 @@ class Finding:
 
     def judged(self, choice: Choice, unseen: HeldOut) -> Discovery:
         """Named, ambiguous, unknown or failed."""
-        best = choice.singles[0] if choice.singles else None
-        if choice.two and choice.pair is not None:
-            return self.named(choice.pair, choice, ((), ()))
-        if best is not None and choice.nameable(best, unseen):
-            return self.named(best, choice, (choice.equal,))
-        pair = choice.pair
-        both = pair is not None and best is not None and choice.explains(pair, best)
-        if pair is not None and both and choice.nameable(pair, unseen):
-            return self.named(pair, choice, ((), ()))
-        return self.unknown(choice, unseen)
+        joint = choice.verdict(unseen)
+        if joint is not None:
+            return self.named(joint, choice, (choice.equal,) if len(joint.added) == 1 else ((), ()))
+        return replace(self.unknown(choice, unseen), untaught=choice.untaught(unseen))
 
     def named(self, joint: Joint, choice: Choice, equal: tuple[tuple[Joint, ...], ...]) -> Discovery:
         """One or two effects with values, errors and evidence."""

@@ -21,7 +21,7 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import freed, growing, settled
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.simulation import Simulator
-from compass_ros.simulation.effects import Attached
+from compass_ros.simulation.effects import Attached, Quantity
 from compass_ros.types import Floats, Ints
 
 _SHARES = (0.0, 0.15, 0.4, 0.7, 1.0)
@@ -50,14 +50,18 @@ class Joint:
     def stands_in(self) -> bool:
         """Whether a field is as narrow as its range allows: it stands for something that is no field."""
         numbers = self.fit.point.values[len(self.simulator.cell.parameters) :]
-        quantities = [q for attached in self.simulator.effects for q in attached.effect.quantities]
-        lengths = [(n, q.low) for n, q in zip(numbers, quantities, strict=True) if q.unit == "m" and not q.amplitude]
-        return any(number <= low for number, low in lengths if low > 0)
+        least = widths([q for attached in self.simulator.effects for q in attached.effect.quantities])
+        return bool(np.any((least > 0) & (numbers <= least)))
 
     def log_evidence(self, correlation_time: float) -> float:
         """Laplace approximation in the prior's units, the data's part divided by the correlation time."""
         hessian, _ = normal_equations(self.likelihood, self.fit.point, self.fit.linear, self.fit.free, self.fit.robust)
         return -self.fit.point.cost / correlation_time - 0.5 * float(np.linalg.slogdet(hessian)[1])
+
+
+def widths(quantities: Sequence[Quantity]) -> Floats:
+    """(q,) least width of a field where a quantity is one [m]; zero for others."""
+    return np.array([q.low if q.unit == "m" and not q.amplitude else 0.0 for q in quantities]).clip(min=0)
 
 
 def widened(simulator: Simulator, likelihood: Likelihood, added: Sequence[Attached]) -> tuple[Simulator, Likelihood]:
@@ -136,14 +140,14 @@ def finished(joint: Joint) -> Joint:
     return replace(joint, fit=settled(joint.likelihood, joint.fit), converged=True, settled=True)
 
 
-def from_first_guess(space: Space, attached: Attached, numbers: Floats) -> Joint:
-    """A fit that begins at the cell's first guess with the (q,) numbers of an effect, and of those that are there."""
-    simulator, likelihood = widened(space.simulator, space.likelihood, (attached,))
+def from_first_guess(space: Space, added: tuple[Attached, ...], numbers: Floats) -> Joint:
+    """A fit that begins at the cell's first guess with the (q,) numbers of effects, and of those that are there."""
+    simulator, likelihood = widened(space.simulator, space.likelihood, added)
     values = likelihood.prior_mean.copy()
     there = np.arange(len(simulator.cell.parameters), len(space.fit.point.values))
     values[there] = space.fit.point.values[there]
     values[-len(numbers) :] = numbers
-    return Joint(simulator, likelihood, _grown(simulator, likelihood, values, space.fit.robust), (attached,))
+    return Joint(simulator, likelihood, _grown(simulator, likelihood, values, space.fit.robust), added)
 
 
 def grown(joint: Joint, attached: Attached, simulator: Simulator, likelihood: Likelihood, robust: float) -> Joint:

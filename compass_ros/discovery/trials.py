@@ -54,7 +54,7 @@ def at_other_rates(space: Space, scores: Sequence[Score]) -> Joint | None:
     quantities = best.candidate.attached.effect.quantities
     low, high = ([getattr(q, side) for q in quantities] for side in ("low", "high"))
     tried = [np.clip(np.where(_rates(best), ratio, 1.0) * best.numbers, low, high) for ratio in RATIOS]
-    return min((from_first_guess(space, best.candidate.attached, numbers) for numbers in tried), key=worth)
+    return min((from_first_guess(space, (best.candidate.attached,), numbers) for numbers in tried), key=worth)
 
 
 def _rates(score: Score) -> Bools:

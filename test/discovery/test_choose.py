@@ -13,7 +13,7 @@ from compass_ros.discovery import choose
 from compass_ros.discovery.beginning import begun, in_place_of
 from compass_ros.discovery.candidates import Candidate, candidates
 from compass_ros.discovery.choice import undecided
-from compass_ros.discovery.choose import _in_its_place, _one_of, _with_contacts, _with_second
+from compass_ros.discovery.choose import _in_its_place, _of_singles, _one_of, _with_contacts, _with_second
 from compass_ros.discovery.joint import fit_jointly
 from compass_ros.discovery.screen import Score
 from compass_ros.discovery.unseen import held_out
@@ -94,3 +94,17 @@ def test_an_effect_that_was_tried_first_does_not_hide_its_twin() -> None:
     assert twin.fit.point.cost == pytest.approx(first.fit.point.cost, abs=3.0)
     assert twin.fit.point.values[-1] == pytest.approx(0.046, abs=0.002)
     assert _in_its_place(first, choice.of([first, twin]), space, asked) == []
+
+
+@pytest.mark.slow
+def test_two_effects_that_were_found_alone_are_put_together() -> None:
+    """Each as it stands alone, the field twice as wide as it is."""
+    latency, true = Attached(EFFECTS["camera_latency"], ()), [0.05, -0.05, 0.04, 0.06, 0.5]
+    space = space_of(recorded_with([SWIRL, latency], [*true, 0.03], np.concatenate([CALM, HELD_OUT])))
+    alone = [joint(space, SWIRL, [0.03, -0.03, 0.03, 0.12, 0.5]), joint(space, latency, [0.02])]
+    asked = [*alone, joint(space, TILT, [1e-3, 0.0])]
+    found = _of_singles(undecided(space).of(asked), space, 1.0)
+    (best,) = (j for j in found if j.added == (SWIRL, latency))
+    plain = undecided(space)
+    assert plain.shown_by(best).share(best) > 0.98
+    assert best.fit.point.values[-6:] == pytest.approx([*true, 0.03], rel=0.2)

@@ -41,7 +41,7 @@ def tried(deviation: Floats, others: Likelihood | None = None) -> tuple[Choice, 
     """What is said of shots with these deviations, judged by others; by default by two that scatter too."""
     space = space_of(recorded(SHOTS, deviation))
     unseen = held_out(others or recorded(HELD_OUT, np.array([0.03, -0.02]), 1), space.likelihood, space.fit)
-    return _with_scatter(undecided(space), space, unseen), unseen
+    return _with_scatter(undecided(space), space, (), unseen), unseen
 
 
 @pytest.mark.slow
@@ -66,7 +66,7 @@ def test_deviations_that_a_speed_explains_are_no_scatter() -> None:
 
 
 @pytest.mark.slow
-def test_a_scatter_that_does_not_predict_is_dropped_before_pairs_are_made() -> None:
+def test_a_scatter_that_does_not_predict_is_dropped() -> None:
     choice, _ = tried(DEVIATION, recorded_with([SWIRL], [0.03, -0.05, 0.06, 0.1, 0.5], HELD_OUT, 1))
     assert not choice.singles
 

@@ -74,6 +74,19 @@ def test_what_predicts_only_a_part_helps_and_is_not_named() -> None:
     assert not replace(choice, singles=(half, weak[0], foretells)).nameable(half, unseen), "another predicts more"
 
 
+def test_what_explains_all_that_was_fitted_and_fails_on_the_others_was_not_taught() -> None:
+    space = space_of(recorded(DRAG, [0.3]))
+    whole = joint(space, DRAG, [0.3])
+    same, other = (
+        held_out(recorded(effect, [size], HELD_OUT, 1), space.likelihood, space.fit)
+        for effect, size in ((DRAG, 0.3), (RIVALS[0], 0.5))
+    )
+    choice = Choice((whole,), None, excess=1000.0, floor=0.0)
+    assert choice.untaught(other)
+    assert not choice.untaught(same)
+    assert not replace(choice, singles=(costing(whole, 300.0),)).untaught(other), "the fitted ones have more to teach"
+
+
 def test_an_excess_that_noise_may_have_made_refutes_nothing() -> None:
     space = space_of(recorded(DRAG, [0.3]))
     unseen = held_out(recorded(DRAG, [0.3], HELD_OUT, 1), space.likelihood, space.fit)
