@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from compass_ros.calibration.least_squares import Point, minimise
-from compass_ros.discovery.beginning import begun, in_place_of
+from compass_ros.discovery.beginning import OF_TWINS, begun, in_place_of
 from compass_ros.discovery.candidates import Candidate, scattered
 from compass_ros.discovery.choice import CLEAR, LEADERS, OF_LIMIT, PREDICTS, Choice, comes_to, evidence, undecided
 from compass_ros.discovery.joint import Joint, converge, finished, from_first_guess, from_second_start, widened, widths
@@ -30,7 +30,7 @@ the noise, is what its form gets wrong, and many a second effect would take some
 LEADS = 0.6
 """Share from which the best effect is surely one of two; below, the second best may be instead."""
 NEARLY = 0.85
-"""Share from which the best effect is first fitted from a second start before others are tried."""
+"""Share from which the best effect, or the best pair, is fitted from a second start before it is given up."""
 CLOSE = 4.0
 """How far behind the best pair a second one may be to be followed too, in steps that promise SLIGHT."""
 OF_CONTACTS, FOLLOWED = (0.06, 0.5), 2
@@ -127,6 +127,8 @@ def _in_pairs(choice: Choice, space: Space, candidates: Sequence[Candidate], uns
     if not choice.good(unseen) and not _surely(choice, pairs, unseen):
         pairs += _with_a_rate(different(choice.singles)[0], candidates, slight)
     if not choice.good(unseen) and not _surely(choice, pairs, unseen):
+        pairs += _with_a_limit(different(choice.singles)[:2], candidates, slight)
+    if not choice.good(unseen) and not _surely(choice, pairs, unseen):
         pairs += _with_contacts(different(choice.singles)[0], candidates, slight)
         if not _surely(choice, pairs, unseen):
             second = next(j for j in choice.singles if j.added == led.added[1:])
@@ -136,6 +138,9 @@ def _in_pairs(choice: Choice, space: Space, candidates: Sequence[Candidate], uns
         choice = _with_each(pair, choice, space)
     if choice.good(unseen):
         return _concluded(choice, space, candidates, unseen)
+    shown = choice.shown_by(pair)
+    if shown.share(pair) > NEARLY and unseen.helps(pair) and not shown.nameable(pair, unseen):
+        pair = from_second_start(pair)
     if pair.fit.point.cost < min(j.fit.point.cost for j in choice.singles):
         choice = choice.shown_by(pair)
     return replace(choice, pair=pair)
@@ -302,6 +307,22 @@ def _with_a_rate(first: Joint, candidates: Sequence[Candidate], slight: float) -
     there, scores = _beyond(first, candidates)
     other = at_other_rates(there, scores)
     return [replace(converge(other, slight), added=(*first.added, *other.added))] if other else []
+
+
+def _with_a_limit(firsts: Sequence[Joint], candidates: Sequence[Candidate], slight: float) -> list[Joint]:
+    """A fit of some effects, each with a limit of the commands: below it first order says nothing of it."""
+    limits = [c for c in candidates if c.name == "velocity_saturation"]
+    found = [
+        replace(
+            begun(j.simulator, j.likelihood, j.fit.point, j.fit.free, j.fit.robust, limit, OF_TWINS),
+            added=(*j.added, limit.attached),
+        )
+        for j in firsts
+        for limit in limits
+        if limit.attached not in j.added
+    ]
+    followed = [further(j, slight, 8) for j in found]
+    return [converge(j, slight) for j in sorted(followed, key=worth)[:1]]
 
 
 def _with_contacts(first: Joint, candidates: Sequence[Candidate], slight: float) -> list[Joint]:

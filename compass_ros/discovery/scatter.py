@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import pearsonr
+from scipy.stats import f as f_distribution
 
 from compass_ros.calibration.least_squares import Fit, Point, minimise
 from compass_ros.calibration.likelihood import Likelihood
@@ -18,7 +18,7 @@ from compass_ros.calibration.residuals import covariance
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.joint import Joint, from_second_start, widened
 from compass_ros.discovery.screen import Space
-from compass_ros.types import Ints
+from compass_ros.types import Floats, Ints
 
 TURNS, ITERATIONS = 2, 5
 """How often deviations and their spread are found in turn before the fit is settled; steps of these fits."""
@@ -74,10 +74,24 @@ def spreads(joint: Joint) -> Ints:
 
 
 def follows_command(joint: Joint) -> bool:
-    """Whether the deviations are no chance: those of a limit grow with the commanded speed."""
-    deviation, commanded = joint.fit.point.launch[:, -1], joint.likelihood.inputs[:, :-1]
+    """Whether the deviations are no chance: those of a limit or a dead band bend with the commanded speed."""
+    commanded = joint.likelihood.inputs[:, :-1]
     varied = commanded[:, np.ptp(commanded, axis=0) > 0]
-    if len(deviation) < 3 or not varied.size:
-        return False
-    least = min(float(pearsonr(column, deviation).pvalue) for column in varied.T)
-    return least * varied.shape[1] < BY_CHANCE
+    return bool(bent_by(varied, joint.fit.point.launch[:, -1]) < BY_CHANCE)
+
+
+def bent_by(numbers: Floats, deviation: Floats) -> float:
+    """Probability that some of k numbers (N, k) tell deviations (N,) so well by chance.
+
+    F tests of a straight line and of a parabola in each number (Bonferroni); 1 where there are too few for those.
+    """
+    least = 1.0
+    for column in numbers.T:
+        for degree in (1, 2):
+            free = len(deviation) - 1 - degree
+            if free > 0:
+                centred = column - np.mean(column)
+                rest = deviation - np.polyval(np.polyfit(centred, deviation, degree), centred)
+                ratio = (np.var(deviation) - np.var(rest)) / degree / (np.var(rest) / free)
+                least = min(least, float(f_distribution.sf(ratio, degree, free)))
+    return min(1.0, 2 * numbers.shape[1] * least)

@@ -9,7 +9,7 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.candidates import candidates, scattered
 from compass_ros.discovery.choice import Choice, undecided
 from compass_ros.discovery.choose import _with_scatter
-from compass_ros.discovery.scatter import spreads
+from compass_ros.discovery.scatter import BY_CHANCE, bent_by, spreads
 from compass_ros.discovery.unseen import HeldOut, held_out
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.types import Floats
@@ -63,6 +63,21 @@ def test_deviations_and_their_spread_are_found_and_predict_other_shots() -> None
 def test_deviations_that_a_speed_explains_are_no_scatter() -> None:
     choice, _ = tried(-0.3 * (SHOTS[:, 3] - np.mean(SHOTS[:, 3])))
     assert not choice.singles
+
+
+def test_a_dead_band_and_a_limit_of_the_speed_bend_deviations() -> None:
+    told = np.linspace(0.4, 0.7, 9)
+    reached = np.minimum(told - 0.02, 0.57) / told
+    deviation = reached / np.mean(reached) - 1
+    unrelated = np.random.default_rng(0).normal(size=(9, 3))
+    assert bent_by(told[:, None], deviation) < bent_by(np.column_stack([told, unrelated]), deviation) < BY_CHANCE
+    assert bent_by(told[:2, None], deviation[:2]) == 1
+
+
+def test_deviations_by_chance_are_rarely_called_bent() -> None:
+    draws = np.random.default_rng(1).normal(size=(1000, 9, 5))
+    alarms = sum(bent_by(draw[:, 1:], draw[:, 0]) < BY_CHANCE for draw in draws)
+    assert 0 < alarms < 18  # 10 are expected at most; more than 17 in one of a hundred runs
 
 
 @pytest.mark.slow
