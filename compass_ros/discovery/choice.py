@@ -23,9 +23,6 @@ FORM_SHARE = 0.6
 """...if the effect explains at least this share."""
 PREDICTS = 0.92
 """Share of the held-out excess that what is named must remove, but for a SMALL remainder: less is another law's."""
-CLEAR = 0.95
-"""Share from which an effect whose rivals all leave MANY_TIMES as much, and predict less, is named though it predicts
-less than that: what its form gets wrong grows in episodes that were not fitted."""
 LITTLE, MANY_TIMES, SEVERAL = 0.12, 4.0, 2
 """Share that an effect may leave where at least so many others, fitted as well, leave so many times as much."""
 OF_LIMIT = 8.0
@@ -96,8 +93,7 @@ class Choice:
         """Whether a model explains the fitted episodes and predicts the others."""
         share = unseen.share(joint)
         predicts = share >= PREDICTS or (share >= FORM_SHARE and unseen.remainder(joint) < SMALL)
-        clear = self.share(joint) > CLEAR and self._alone(joint) and self._foremost(joint, unseen)
-        return self.enough(joint) and unseen.helps(joint) and (predicts or clear) and not joint.stands_in
+        return self.enough(joint) and unseen.helps(joint) and predicts and not joint.stands_in
 
     def untaught(self, unseen: HeldOut) -> bool:
         """Whether a model leaves nothing of the fitted episodes and fails on the others.
@@ -121,10 +117,6 @@ class Choice:
         if len(joint.added) > 1 or len(others) < SEVERAL or left > LITTLE:
             return False
         return all(1 - self.share(other) > MANY_TIMES * left for other in others)
-
-    def _foremost(self, joint: Joint, unseen: HeldOut) -> bool:
-        """Whether no other effect predicts the episodes that were not fitted better."""
-        return all(unseen.surprise(joint) < unseen.surprise(other) for other in self._others(joint))
 
     def _others(self, joint: Joint) -> list[Joint]:
         """Fits of other effects; one that comes to this at an end of its shapes is no other."""

@@ -10,7 +10,7 @@ import numpy as np
 from compass_ros.calibration.least_squares import Point, minimise
 from compass_ros.discovery.beginning import OF_TWINS, begun, in_place_of
 from compass_ros.discovery.candidates import Candidate, scattered
-from compass_ros.discovery.choice import CLEAR, LEADERS, OF_LIMIT, PREDICTS, Choice, comes_to, evidence, undecided
+from compass_ros.discovery.choice import LEADERS, OF_LIMIT, PREDICTS, Choice, comes_to, evidence, undecided
 from compass_ros.discovery.joint import Joint, converge, finished, from_first_guess, from_second_start, widened, widths
 from compass_ros.discovery.scatter import fit_scattered, follows_command, settled_scatter
 from compass_ros.discovery.screen import Score, Space
@@ -31,6 +31,8 @@ LEADS = 0.6
 """Share from which the best effect is surely one of two; below, the second best may be instead."""
 NEARLY = 0.85
 """Share from which the best effect, or the best pair, is fitted from a second start before it is given up."""
+WHOLLY = 0.95
+"""Share that a scatter must explain."""
 CLOSE = 4.0
 """How far behind the best pair a second one may be to be followed too, in steps that promise SLIGHT."""
 OF_CONTACTS, FOLLOWED = (0.06, 0.5), 2
@@ -108,7 +110,7 @@ def _with_scatter(choice: Choice, space: Space, candidates: Sequence[Candidate],
             continue
         joint = settled_scatter(joint)
         judged = choice.of([joint, *choice.singles])
-        if judged.share(joint) > CLEAR and judged.nameable(joint, unseen):
+        if judged.share(joint) > WHOLLY and judged.nameable(joint, unseen):
             return _concluded(judged, space, candidates, unseen)
     return choice
 

@@ -56,16 +56,31 @@ class Untaught:
 
 
 @dataclass(frozen=True)
+class Prediction:
+    """What a fitted model says of episodes that it has not seen."""
+
+    surprise: float
+    """Minus the log predictive density, up to a constant: noise and the fit's own uncertainty."""
+    missed: float
+    """Robust loss of the trajectories that it predicts with its best numbers."""
+
+
+@dataclass(frozen=True)
 class HeldOut:
     """Episodes that were never fitted, weighted as the fitted ones are."""
 
     likelihood: Likelihood
     untaught: Untaught
-    before: float
-    """Surprise by the model without effects."""
+    plain: Prediction
+    """Of the model without effects."""
     floor: float
     """Surprise by noise alone."""
-    _asked: dict[Joint, float] = field(default_factory=dict, repr=False)
+    _asked: dict[Joint, Prediction] = field(default_factory=dict, repr=False)
+
+    @property
+    def before(self) -> float:
+        """Surprise by the model without effects."""
+        return self.plain.surprise
 
     @property
     def excess(self) -> float:
@@ -77,11 +92,15 @@ class HeldOut:
         """Excess from which it can be judged: half the chi-square of N white values scatters by sqrt(N / 2)."""
         return max(HELD_OUT_SEEN, BEYOND_SCATTER * float(np.sqrt(0.5 * self.likelihood.measurements)))
 
-    def surprise(self, joint: Joint) -> float:
-        """Minus the log predictive density of a fitted model; rolled out once for each."""
+    def prediction(self, joint: Joint) -> Prediction:
+        """Of a fitted model; rolled out once for each."""
         if joint not in self._asked:
-            self._asked[joint] = surprise(self.likelihood, joint.likelihood, joint.fit, self.untaught)
+            self._asked[joint] = predict(self.likelihood, joint.likelihood, joint.fit, self.untaught)
         return self._asked[joint]
+
+    def surprise(self, joint: Joint) -> float:
+        """Minus the log predictive density of a fitted model."""
+        return self.prediction(joint).surprise
 
     def share(self, joint: Joint) -> float:
         """Part of the held-out excess that a model removes; 1 where there is none to speak of."""
@@ -92,14 +111,19 @@ class HeldOut:
         return 2 * max(self.surprise(joint) - self.floor, 0.0) / self.likelihood.measurements
 
     def helps(self, joint: Joint) -> bool:
-        """Whether a model predicts these episodes better: clearly, where there is something to gain."""
+        """Whether a model predicts these episodes better: clearly, where there is something to gain.
+
+        With its best numbers too: a model that is unsure of them is surprised by nothing.
+        """
         if self.excess > self.seen:
-            return self.share(joint) > HELD_OUT_SHARE
+            gained = self.plain.missed - self.prediction(joint).missed
+            by_numbers = gained > HELD_OUT_SHARE * (self.plain.missed - self.floor)
+            return by_numbers and self.share(joint) > HELD_OUT_SHARE
         return self.before - self.surprise(joint) > -5.0
 
     def beside(self, joint: Joint) -> HeldOut:
         """The same episodes, with another model as the one to surpass."""
-        return replace(self, before=self.surprise(joint))
+        return replace(self, plain=self.prediction(joint))
 
 
 def unexpected(judge: Likelihood, refined: Refined) -> bool:
@@ -121,7 +145,7 @@ def held_out(judge: Likelihood, fitted: Likelihood, fit: Fit) -> HeldOut:
     linear = linearise(judge, point, fit.free, difference_steps(fit.linear))
     calm = calmed(judge, linear)
     floor = noise_cost(calm, replace(fit, free=np.zeros(0, dtype=np.int64)))
-    return HeldOut(calm, untaught, surprise(calm, fitted, fit, untaught), floor)
+    return HeldOut(calm, untaught, predict(calm, fitted, fit, untaught), floor)
 
 
 def _untaught(judge: Likelihood, fitted: Likelihood, fit: Fit) -> Untaught:
@@ -133,8 +157,8 @@ def _untaught(judge: Likelihood, fitted: Likelihood, fit: Fit) -> Untaught:
     return Untaught(which, influence.steps[which])
 
 
-def surprise(unseen: Likelihood, fitted: Likelihood, fit: Fit, untaught: Untaught) -> float:
-    """Minus the log predictive density of unseen episodes, up to a constant: noise and the fit's own uncertainty.
+def predict(unseen: Likelihood, fitted: Likelihood, fit: Fit, untaught: Untaught) -> Prediction:
+    """How surprising unseen episodes are to a fit, and how far it misses them.
 
     A model that is unsure what its parameters are may be wrong about an episode without being refuted by it: the
     residual has the covariance 1 + J C J', C that of the fitted parameters and of those `untaught`, which are fitted
@@ -166,7 +190,8 @@ def surprise(unseen: Likelihood, fitted: Likelihood, fit: Fit, untaught: Untaugh
     same = np.concatenate([np.arange(taught, p), p + np.flatnonzero(of_cell)])
     common = inner[np.ix_(same, same)]
     volume = np.linalg.slogdet(inner)[1] - np.linalg.slogdet(common)[1] - np.linalg.slogdet(precision)[1]
-    return loss + 0.5 * float((away + move) @ precision @ (away + move)) + 0.5 * float(volume)
+    surprise = loss + 0.5 * float((away + move) @ precision @ (away + move)) + 0.5 * float(volume)
+    return Prediction(surprise, 0.5 * float(np.sum(robust_loss(residual, ROBUST))))
 
 
 def noise_cost(likelihood: Likelihood, fit: Fit) -> float:

@@ -15,7 +15,7 @@ from compass_ros.cells import load
 from compass_ros.discovery.choice import PREDICTS, Choice
 from compass_ros.discovery.choose import simplest
 from compass_ros.discovery.joint import Joint
-from compass_ros.discovery.unseen import HELD_OUT_SEEN, held_out, unexpected
+from compass_ros.discovery.unseen import HELD_OUT_SEEN, Prediction, held_out, unexpected
 from compass_ros.pipeline import pose
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
@@ -66,12 +66,28 @@ def test_what_predicts_only_a_part_helps_and_is_not_named() -> None:
     assert unseen.helps(half)
     assert choice.nameable(whole, unseen)
     assert not choice.nameable(half, unseen)
-    weak, strong = (tuple(costing(joint(space, rival, [0.01]), left) for rival in RIVALS) for left in (900.0, 100.0))
-    assert replace(choice, singles=(half, *weak)).nameable(half, unseen), "no other one explains much"
-    assert not replace(choice, singles=(half, *strong)).nameable(half, unseen), "others leave 100, it leaves 30"
-    foretells = costing(joint(space, RIVALS[1], [0.5]), 900.0)
-    assert unseen.share(foretells) > unseen.share(half)
-    assert not replace(choice, singles=(half, weak[0], foretells)).nameable(half, unseen), "another predicts more"
+
+
+def test_what_leaves_a_little_is_named_where_no_other_explains_much() -> None:
+    space = space_of(recorded(DRAG, [0.3]))
+    unseen = held_out(recorded(DRAG, [0.3], HELD_OUT, 1), space.likelihood, space.fit)
+    whole = costing(joint(space, DRAG, [0.3]), 100.0)
+    weak, strong = (tuple(costing(joint(space, rival, [0.01]), left) for rival in RIVALS) for left in (900.0, 300.0))
+    choice = Choice((whole, *weak), None, excess=1000.0, floor=0.0)
+    assert choice.nameable(whole, unseen)
+    assert not replace(choice, singles=(whole, *strong)).nameable(whole, unseen), "others leave 300, it leaves 100"
+
+
+def test_what_is_unsure_of_its_numbers_predicts_nothing_though_nothing_refutes_it() -> None:
+    """Both excuse the held-out shots; the best numbers of one do no better there than no effect."""
+    space = space_of(recorded(DRAG, [0.3]))
+    unseen = held_out(recorded(DRAG, [0.3], HELD_OUT, 1), space.likelihood, space.fit)
+    sure, unsure = joint(space, DRAG, [0.3]), joint(space, DRAG, [0.01])
+    excused = Prediction(unseen.prediction(sure).surprise, unseen.prediction(unsure).missed)
+    unseen = replace(unseen, _asked={sure: unseen.prediction(sure), unsure: excused})
+    assert unseen.share(unsure) == unseen.share(sure) > PREDICTS
+    assert unseen.helps(sure)
+    assert not unseen.helps(unsure)
 
 
 def test_what_explains_all_that_was_fitted_and_fails_on_the_others_was_not_taught() -> None:
@@ -92,7 +108,10 @@ def test_an_excess_that_noise_may_have_made_refutes_nothing() -> None:
     unseen = held_out(recorded(DRAG, [0.3], HELD_OUT, 1), space.likelihood, space.fit)
     weak, scatter = joint(space, DRAG, [0.15]), np.sqrt(unseen.likelihood.measurements / 2)
     before = unseen.surprise(weak) + 1.0
-    beyond, within = (replace(unseen, before=before, floor=before - times * scatter) for times in (3.0, 1.5))
+    beyond, within = (
+        replace(unseen, plain=Prediction(before, unseen.plain.missed), floor=before - times * scatter)
+        for times in (3.0, 1.5)
+    )
     assert 0 < beyond.share(weak) < PREDICTS
     assert not beyond.helps(weak)
     assert within.excess > HELD_OUT_SEEN
@@ -104,16 +123,15 @@ def test_a_wind_so_fast_that_it_is_a_tilt_is_no_rival_of_the_tilt() -> None:
     tilt, wind = Attached(EFFECTS["table_tilt"], PUCKS), Attached(EFFECTS["crosswind"], PUCKS)
     space = space_of(recorded(tilt, [1e-3, -2e-3]))
     unseen = held_out(recorded(tilt, [1e-3, -2e-3], HELD_OUT, 1), space.likelihood, space.fit)
-    half = costing(joint(space, tilt, [5e-4, -1e-3]), 30.0)
+    true = costing(joint(space, tilt, [1e-3, -2e-3]), 100.0)
     weak = tuple(costing(joint(space, rival, [0.01]), 900.0) for rival in RIVALS)
-    same, better = (costing(joint(space, wind, [5e-3, -1e-2, 3.0]), left) for left in (29.0, 5.0))
-    choice = Choice((half, *weak), None, excess=1000.0, floor=0.0)
-    assert 0.4 < unseen.share(half) < 0.92
-    assert choice.nameable(half, unseen)
-    assert replace(choice, singles=(same, half, *weak)).nameable(half, unseen)
-    assert simplest([same, half]) is half
-    assert not replace(choice, singles=(better, half, *weak)).nameable(half, unseen), "the wind explains more"
-    assert simplest([better, half]) is better
+    same, better = (costing(joint(space, wind, [5e-3, -1e-2, 3.0]), left) for left in (99.0, 5.0))
+    choice = Choice((true, *weak), None, excess=1000.0, floor=0.0)
+    assert choice.nameable(true, unseen)
+    assert replace(choice, singles=(same, true, *weak)).nameable(true, unseen)
+    assert simplest([same, true]) is true
+    assert not replace(choice, singles=(better, true, *weak)).nameable(true, unseen), "the wind explains more"
+    assert simplest([better, true]) is better
 
 
 def costing(fitted: Joint, cost: float) -> Joint:
