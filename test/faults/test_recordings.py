@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
 import threading
@@ -104,9 +105,10 @@ def test_bags_deleted_while_they_are_read(sound: list[Episode], tmp_path: Path) 
     opened = threading.Event()
 
     def watch() -> None:
-        """The last bag goes when the first one is open."""
+        """The last bag goes when the first one is open; the reader waits for that."""
         while process.poll() is None and not opened.is_set():
             if any("copy" in name for name in open_files(process.pid)):
+                process.send_signal(signal.SIGSTOP)
                 opened.set()
             time.sleep(0.0005)
 
@@ -114,6 +116,7 @@ def test_bags_deleted_while_they_are_read(sound: list[Episode], tmp_path: Path) 
     watcher.start()
     assert opened.wait(300)
     shutil.rmtree(bags / "copy59")
+    process.send_signal(signal.SIGCONT)
     _, said = process.communicate(timeout=600)
     watcher.join()
     assert process.returncode == 1, said
