@@ -27,7 +27,8 @@ _STEP = 0.02
 _ROBUST = 4.0
 """Scale of the loss [noise]: what grows without limit after an unlucky collision counts in proportion."""
 _DRAWS, _FOLLOWED = 2, 3
-"""Shapes from which each formula starts to imitate a law from outside; how many are compared in trajectories."""
+"""Drawn shapes from which each formula starts to imitate a law from outside, beside the law's own place and size; how
+many formulas are compared in trajectories."""
 
 
 @dataclass(frozen=True)
@@ -57,13 +58,19 @@ def best_imitation(strength: Strength, judge: Judge, places: Places, played: Pla
     """The formula of forces that comes nearest to a law from outside the library."""
     rng = np.random.default_rng(0)
     starts = []
+    own = strength.ingredient.shape
     for name, form in FORMS.items():
-        for _ in range(_DRAWS):
-            drawn = Ingredient(KNOWN[name], strength.ingredient.objects, KNOWN[name].draw(rng, places, 0.0))
-            numbers, left = along(strength.ingredient, drawn, form, judge.table, played, coarse=True)
+        drawn = [KNOWN[name].draw(rng, places, 0.0) for _ in range(_DRAWS)]
+        there = {**drawn[0], **{key: own[key] for key in drawn[0] if key in own}}
+        for shape in (*drawn, there):
+            like = Ingredient(KNOWN[name], strength.ingredient.objects, shape)
+            numbers, left = along(strength.ingredient, like, form, judge.table, played, coarse=True)
             starts.append((left, name, numbers))
-    nearest = sorted(starts, key=lambda start: start[0])[:_FOLLOWED]
-    return min((_by_force(name, q, strength, judge) for _, name, q in nearest), key=lambda found: found.left_m)
+    nearest: dict[str, Floats] = {}
+    for _, name, numbers in sorted(starts, key=lambda start: start[0]):
+        nearest.setdefault(name, numbers)
+    followed = list(nearest.items())[:_FOLLOWED]
+    return min((_by_force(name, q, strength, judge) for name, q in followed), key=lambda found: found.left_m)
 
 
 def _lens(q: Floats) -> list[Ingredient]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -36,7 +36,7 @@ WHOLLY = 0.95
 CLOSE = 4.0
 """How far behind the best pair a second one may be to be followed too, in steps that promise SLIGHT."""
 OF_CONTACTS, FOLLOWED = (0.06, 0.5), 2
-"""Sizes from which effects of contacts are followed beside another effect, in their scale; how many to the end."""
+"""Sizes from which effects of contacts begin beside another effect, in their scale; how many fits are followed."""
 WIDTHS = (1.0, 0.5)
 """Widths of fields that are tried where two effects meet, as parts of those that each has alone."""
 SLIGHT = 0.005
@@ -123,18 +123,20 @@ def _in_pairs(choice: Choice, space: Space, candidates: Sequence[Candidate], uns
     pairs = _pairs(firsts, candidates, slight)
     if not pairs:
         return choice
-    if not _surely(choice, pairs, unseen):
+    if not _enough(choice, pairs, unseen):
         pairs = sorted([*pairs, *_of_singles(choice, space, slight)], key=worth)
     led, choice = pairs[0], _with_each(pairs[0], choice, space)
-    if not choice.good(unseen) and not _surely(choice, pairs, unseen):
-        pairs += _with_a_rate(different(choice.singles)[0], candidates, slight)
-    if not choice.good(unseen) and not _surely(choice, pairs, unseen):
-        pairs += _with_a_limit(different(choice.singles)[:2], candidates, slight)
-    if not choice.good(unseen) and not _surely(choice, pairs, unseen):
-        pairs += _with_contacts(different(choice.singles)[0], candidates, slight)
-        if not _surely(choice, pairs, unseen):
-            second = next(j for j in choice.singles if j.added == led.added[1:])
-            pairs += _pairs([second], candidates, slight)
+    leading = different(choice.singles)[:2]
+    second = next(j for j in choice.singles if j.added == led.added[1:])
+    ways: tuple[Callable[[], list[Joint]], ...] = (
+        lambda: _with_a_rate(leading[0], candidates, slight),
+        lambda: _with_a_limit(leading, candidates, slight),
+        lambda: _with_contacts(leading[0], candidates, slight),
+        lambda: _pairs([second], candidates, slight),
+    )
+    for way in ways:
+        if not _enough(choice, pairs, unseen):
+            pairs += way()
     pair = max(pairs, key=lambda p: evidence(p, unseen))
     if not choice.good(unseen) and pair is not led:
         choice = _with_each(pair, choice, space)
@@ -172,10 +174,10 @@ def _with_each(pair: Joint, choice: Choice, space: Space) -> Choice:
     return choice.of(sorted([*alone, *choice.singles], key=worth))
 
 
-def _surely(choice: Choice, pairs: Sequence[Joint], unseen: HeldOut) -> bool:
-    """Whether the best of some pairs leaves nothing to look for."""
+def _enough(choice: Choice, pairs: Sequence[Joint], unseen: HeldOut) -> bool:
+    """Whether an effect alone is enough, or the best of some pairs leaves nothing to look for."""
     best = min(pairs, key=worth)
-    return choice.shown_by(best).share(best) > SURELY and unseen.helps(best)
+    return bool(choice.good(unseen)) or (choice.shown_by(best).share(best) > SURELY and unseen.helps(best))
 
 
 def _concluded(choice: Choice, space: Space, candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
@@ -314,33 +316,30 @@ def _with_a_rate(first: Joint, candidates: Sequence[Candidate], slight: float) -
 def _with_a_limit(firsts: Sequence[Joint], candidates: Sequence[Candidate], slight: float) -> list[Joint]:
     """A fit of some effects, each with a limit of the commands: below it first order says nothing of it."""
     limits = [c for c in candidates if c.name == "velocity_saturation"]
-    found = [
-        replace(
-            begun(j.simulator, j.likelihood, j.fit.point, j.fit.free, j.fit.robust, limit, OF_TWINS),
-            added=(*j.added, limit.attached),
-        )
-        for j in firsts
-        for limit in limits
-        if limit.attached not in j.added
-    ]
-    followed = [further(j, slight, 8) for j in found]
-    return [converge(j, slight) for j in sorted(followed, key=worth)[:1]]
+    return _begun_beside(firsts, limits, OF_TWINS, slight)
 
 
 def _with_contacts(first: Joint, candidates: Sequence[Candidate], slight: float) -> list[Joint]:
-    """A fit of one effect with each effect of contacts, the best first.
+    """A fit of one effect with an effect of contacts.
 
     First order says little of those: dampings take a small one away, and have to give it back as it grows.
     """
-    own = {a.effect.name for a in first.added}
-    of_contacts = [
-        c
-        for c in candidates
-        if c.attached.effect.channel == "contact" and c.attached.effect.on != "walls" and c.name not in own
+    of_contacts = [c for c in candidates if c.attached.effect.channel == "contact" and c.attached.effect.on != "walls"]
+    return _begun_beside([first], different(of_contacts), OF_CONTACTS, slight)
+
+
+def _begun_beside(
+    firsts: Sequence[Joint], others: Sequence[Candidate], sizes: Sequence[float], slight: float
+) -> list[Joint]:
+    """The best fit of one effect with another that begins with the best of some sizes, if there is another."""
+    joints = [
+        replace(
+            begun(j.simulator, j.likelihood, j.fit.point, j.fit.free, j.fit.robust, other, sizes),
+            added=(*j.added, other.attached),
+        )
+        for j in firsts
+        for other in others
+        if other.name not in {a.effect.name for a in j.added}
     ]
-    point, free, robust = first.fit.point, first.fit.free, first.fit.robust
-    joints = (
-        begun(first.simulator, first.likelihood, point, free, robust, c, OF_CONTACTS) for c in different(of_contacts)
-    )
     followed = [further(j, slight, 8) for j in sorted(joints, key=worth)[:FOLLOWED]]
-    return [replace(converge(j, slight), added=(*first.added, *j.added)) for j in sorted(followed, key=worth)[:1]]
+    return [converge(j, slight) for j in sorted(followed, key=worth)[:1]]
