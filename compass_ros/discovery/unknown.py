@@ -15,6 +15,10 @@ _SIZES = (1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 """Prior sizes of a flexible push that are tried [m/s^2]."""
 _LENGTH = 0.12
 """Distance over which a flexible push is alike [m]."""
+_SHARED = 0.5
+"""Part of a push's variance that is the same for all movers at one place and time; the rest is each mover's own."""
+_CLEARLY = 10.0
+"""Log evidence from which a push stands out, and by which a push on one mover must surpass one on all."""
 _HALF = 0.6
 """Share of the pushes' strength that a region must hold to be told as the place."""
 _PHASE: Mapping[Channel, Phase] = {"actuation": "strike", "contact": "object_contact", "sensing": "all"}
@@ -35,12 +39,12 @@ def whereabouts(space: Space, choice: Choice) -> tuple[Where, bool]:
     """Object, phase and channel of what is left, and whether it stands out at all.
 
     Pushes that depend smoothly on place and time, on all movers or on one, are weighed against the best fits of known
-    effects of the other channels: what explains more says where it is.
+    effects of the other channels: what explains more says where it is. What is struck first moves the others too, so a
+    push on it alone explains almost all of a push on all: one mover is told only where the others clearly feel nothing.
     """
     movers = space.pushes.movers
-    sets = [movers] if len(movers) < 2 else [movers, *((m,) for m in movers)]
-    pushes = {objects: _push(space, objects) for objects in sets}
-    best = max(pushes, key=lambda objects: pushes[objects].gain * (1.02 if len(objects) == 1 else 1.0))
+    pushes = {objects: _push(space, objects) for objects in dict.fromkeys([movers, *((m,) for m in movers)])}
+    best = max(pushes, key=lambda objects: pushes[objects].gain + (_CLEARLY if objects == movers else 0.0))
     others = {j.added[0].effect.channel: j for j in reversed(choice.singles) if j.added[0].effect.channel != "dynamics"}
     rival = min(others.values(), key=lambda j: j.fit.point.cost, default=None)
     explained = choice.floor + choice.excess - rival.fit.point.cost if rival else 0.0
@@ -48,7 +52,7 @@ def whereabouts(space: Space, choice: Choice) -> tuple[Where, bool]:
         channel = rival.added[0].effect.channel
         return Where("all", _PHASE[channel], channel), True
     name = best[0] if len(best) == 1 and len(movers) > 1 else "all"
-    return Where(name, "free", "dynamics", _region(space, pushes[best])), pushes[best].gain > 10.0
+    return Where(name, "free", "dynamics", _region(space, pushes[best])), pushes[best].gain > _CLEARLY
 
 
 def _kernel(space: Space, objects: tuple[str, ...]) -> Floats:
@@ -58,10 +62,12 @@ def _kernel(space: Space, objects: tuple[str, ...]) -> Floats:
     time = np.broadcast_to(pushes.moments[None, :, None], pushes.paths.shape[:3]).ravel()
     acts = np.array([m in objects for m in pushes.movers])
     on = np.broadcast_to(acts, pushes.paths.shape[:3]).ravel().astype(float)
+    mover = np.broadcast_to(np.arange(len(pushes.movers)), pushes.paths.shape[:3]).ravel()
+    alike = np.where(mover[:, None] == mover[None], 1.0, _SHARED)
     apart = np.sum((place[:, None] - place[None]) ** 2, axis=2) / _LENGTH**2
     field = np.exp(-0.5 * apart)
     pulse = np.exp(-0.5 * ((time[:, None] - time[None]) / 0.15) ** 2)
-    return np.asarray((field + pulse) * on[:, None] * on[None])
+    return np.asarray((field + pulse) * alike * on[:, None] * on[None])
 
 
 def _push(space: Space, objects: tuple[str, ...]) -> _Push:
