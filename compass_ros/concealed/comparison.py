@@ -54,6 +54,8 @@ class Comparison:
     """Share of the excess held-out error that the effects remove."""
     held_out_m: Mapping[str, float]
     """rms on held-out episodes by model, and `floor`: what noise alone made there."""
+    left_m: float | None
+    """What the calibrated parameters leave above the noise, rms over all episodes [m]: the best leave no more."""
     apart_m: float | None
     """What the nearest formula of the library leaves of an effect from outside it, rms [m]."""
     ordinary_z: float | None
@@ -92,6 +94,7 @@ def compare(result: Json, answer: Json) -> Comparison:
         parameters=tuple(check for e in effects for check in _parameters(e, mismatch["effects"])) if named else (),
         gain=_gain(result, answer) if effects else None,
         held_out_m=_held_out(result, answer),
+        left_m=_left(result, answer),
         apart_m=single["nearest"]["left_m"] if kind == "outside" and single and single.get("nearest") else None,
         ordinary_z=_ordinary(result["parameters"], answer["parameters"]),
     )
@@ -161,6 +164,20 @@ def _held_out(result: Json, answer: Json) -> dict[str, float]:
     known = answer["noise_floor_m"]
     floors = [known[name] for name in result["episodes"]["held_out"] if name in known]
     return out | ({"floor": float(np.sqrt(np.mean(np.square(floors))))} if floors else {})
+
+
+def _left(result: Json, answer: Json) -> float | None:
+    """Excess of the calibrated simulator without effects over what noise alone made; None where it was not judged."""
+    gaps, squares, count = result["gap"]["calibrated"] or {}, 0.0, 0
+    for part in ("fit", "held_out"):
+        floors = [answer["noise_floor_m"].get(name) for name in result["episodes"][part]]
+        if not floors:
+            continue
+        if None in floors or not gaps.get(part) or gaps[part]["rmse_m"] is None:
+            return None
+        squares += len(floors) * gaps[part]["rmse_m"] ** 2 - float(np.sum(np.square(floors)))
+        count += len(floors)
+    return float(np.sqrt(max(squares, 0.0) / count)) if count else None
 
 
 def _gain(result: Json, answer: Json) -> float | None:

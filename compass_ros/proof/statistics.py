@@ -100,7 +100,11 @@ def _kind(line: Line) -> str:
 
 
 def _felt(line: Line) -> bool:
-    return line["suite"] == "small" or all(effect["rms_m"] >= _FELT_M for effect in line.get("effects") or ())
+    """Whether each effect moves the pucks enough after the best parameters: those of the answer, or those found."""
+    sizes = [effect["rms_m"] for effect in line.get("effects") or ()]
+    if sizes and (left := _mark(line, "left_m")) is not None:
+        sizes.append(left)
+    return line["suite"] == "small" or min(sizes, default=_FELT_M) >= _FELT_M
 
 
 def _share(what: str, among: Sequence[Line], mark: str, bar: float, most: bool = False) -> Row:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from compass_ros.concealed.comparison import compare
@@ -80,6 +81,17 @@ def test_a_right_name_and_its_numbers() -> None:
     assert all(c.covered for c in marks.parameters)
     assert marks.gain == pytest.approx(0.75)
     assert marks.ordinary_z == pytest.approx(2.0)
+
+
+def test_what_the_parameters_leave_of_all_episodes() -> None:
+    """Fitted: 3 mm over a noise of 1 mm in one; held out: 5 mm over 1 mm in two."""
+    found, truth = result("none"), answer("one", EFFECT)
+    assert compare(found, truth).left_m is None, "the fitted ones were not judged"
+    found["gap"]["calibrated"]["fit"] = {"d": {}, "rmse_m": 0.003}
+    truth["noise_floor_m"]["a"] = 0.001
+    assert compare(found, truth).left_m == pytest.approx(1e-3 * np.sqrt((8 + 2 * 24) / 3))
+    truth["noise_floor_m"]["a"] = 0.1
+    assert compare(found, truth).left_m == 0.0, "less than the noise"
 
 
 @pytest.mark.parametrize(

@@ -197,6 +197,14 @@ def test_an_effect_that_parameters_absorb_is_not_asked_for() -> None:
     assert table([line | {"suite": "small"} for line in found])[0].count == "2 of 2", "small by intent"
 
 
+def test_an_effect_that_the_calibrated_parameters_absorb_is_not_asked_for() -> None:
+    said = {"effects": [{"rms_m": 5e-3}]}
+    found = [line | said for line in worlds({"left_m": 3e-4, "right": False}, {"left_m": 4e-3}, {"left_m": None})]
+    assert table(found)[0].count == "2 of 2"
+    nothing = worlds({"kind": "none", "left_m": 0.0})
+    assert table(nothing)[-1].value == "0", "where nothing is missing nothing is left"
+
+
 def test_no_worlds_make_no_claims() -> None:
     assert all(row.reached is None for row in table([]))
 
