@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from compass_ros.proof.lines import Line
-from compass_ros.proof.statistics import wilson
+from compass_ros.proof.statistics import felt, wilson
 from compass_ros.reporting.markdown import markdown_table, replace_between
 
 BEGIN, END = "<!-- rivals: begin -->\n", "<!-- rivals: end -->"
@@ -39,10 +39,12 @@ class Said:
 
 
 def rows(rivals: Iterable[Line], ours: Iterable[Line]) -> list[tuple[str, ...]]:
-    """Cells of the table for the worlds of one suite that the rivals have judged."""
-    done = [line for line in rivals if line.get("rivals")]
-    seeds = {(line["suite"], line["seed"]) for line in done}
-    said = [_own(line) for line in ours if (line["suite"], line["seed"]) in seeds and line.get("marks")]
+    """Cells of the table for the worlds of one suite that the rivals have judged, less those that ours leaves out."""
+    own = list(ours)
+    faint = {_world(line) for line in own if not felt(line)}
+    done = [line for line in rivals if line.get("rivals") and _world(line) not in faint]
+    seeds = {_world(line) for line in done}
+    said = [_own(line) for line in own if _world(line) in seeds and line.get("marks")]
     said += [_of(name, marks, line) for line in done for name, marks in line["rivals"].items()]
     methods = dict.fromkeys(s.method for s in said)
     return [_row(method, [s for s in said if s.method == method]) for method in methods]
@@ -61,7 +63,8 @@ def markdown(rivals: Iterable[Line], ours: Iterable[Line]) -> str:
     for suite, among in by_suite(rivals).items():
         commits = ", ".join(sorted({str(line["commit"]) for line in among}))
         failed = sum(1 for line in among if not line.get("rivals"))
-        parts.append(f"### {suite}: {len(among)} worlds, {failed} of them failed (commit {commits})\n")
+        worlds = f"{len(among)} world{'' if len(among) == 1 else 's'}"
+        parts.append(f"### {suite}: {worlds}, {failed} of them failed (commit {commits})\n")
         parts.append(markdown_table(HEAD, rows(among, own)) + "\n")
     return "\n".join(parts) or "No run yet.\n"
 
@@ -69,6 +72,10 @@ def markdown(rivals: Iterable[Line], ours: Iterable[Line]) -> str:
 def write_page(path: Path, rivals: Iterable[Line], ours: Iterable[Line]) -> None:
     """Replace what stands between the markers. Raises ConfigError where the page has none."""
     replace_between(path, BEGIN, END, markdown(rivals, ours))
+
+
+def _world(line: Line) -> tuple[str, int]:
+    return str(line["suite"]), int(line["seed"])
 
 
 def _own(line: Line) -> Said:

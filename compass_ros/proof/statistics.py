@@ -42,11 +42,11 @@ def table(found: Sequence[Line]) -> list[Row]:
     if suite == "small":
         return _small(found)
     lower = _LOWER.get(suite, 0.0)
-    felt = [x for x in found if _felt(x)]
-    one, two, none, outside = ([x for x in felt if _kind(x) == kind] for kind in ("one", "two", "none", "outside"))
+    judged = [x for x in found if felt(x)]
+    one, two, none, outside = ([x for x in judged if _kind(x) == kind] for kind in ("one", "two", "none", "outside"))
     alone = [x for x in one if _mark(x, "first_right") is not None and _mark(x, "right")]
     apart = [x for x in outside if (_mark(x, "apart_m") or 0.0) >= _APART_M]
-    checks = [c for x in felt for c in _marks(x).get("parameters", ())]
+    checks = [c for x in judged for c in _marks(x).get("parameters", ())]
     centres = [_mark(x, "centre_error_m") for x in one if _mark(x, "right") and _mark(x, "centre_error_m") is not None]
     gains = [_mark(x, "gain") for x in one + two if _mark(x, "gain") is not None]
     return [
@@ -65,7 +65,7 @@ def table(found: Sequence[Line]) -> list[Row]:
         _between("parameters of effects: 90 % intervals hold the truth", [c["covered"] for c in checks], 0.80, 0.97),
         _median("share of the excess held-out error removed, median", gains, 0.9 - lower),
         *_times(found),
-        Row("left out above: an effect below 1 mm rms", "-", str(len(found) - len(felt)), "-", str(len(found)), None),
+        Row("left out above: an effect below 1 mm rms", "-", str(len(found) - len(judged)), "-", str(len(found)), None),
     ]
 
 
@@ -79,6 +79,14 @@ def _small(found: Sequence[Line]) -> list[Row]:
         _share("one effect: misnamed", found, "misnamed", 0.03, most=True),
         *_times(found),
     ]
+
+
+def felt(line: Line) -> bool:
+    """Whether each effect moves the pucks enough after the best parameters: those of the answer, or those found."""
+    sizes = [effect["rms_m"] for effect in line.get("effects") or ()]
+    if sizes and (left := _mark(line, "left_m")) is not None:
+        sizes.append(left)
+    return line["suite"] == "small" or min(sizes, default=_FELT_M) >= _FELT_M
 
 
 def wilson(outcomes: Sequence[bool]) -> str:
@@ -97,14 +105,6 @@ def _mark(line: Line, name: str) -> Any:
 
 def _kind(line: Line) -> str:
     return str(_marks(line).get("kind", line.get("kind", "")))
-
-
-def _felt(line: Line) -> bool:
-    """Whether each effect moves the pucks enough after the best parameters: those of the answer, or those found."""
-    sizes = [effect["rms_m"] for effect in line.get("effects") or ()]
-    if sizes and (left := _mark(line, "left_m")) is not None:
-        sizes.append(left)
-    return line["suite"] == "small" or min(sizes, default=_FELT_M) >= _FELT_M
 
 
 def _share(what: str, among: Sequence[Line], mark: str, bar: float, most: bool = False) -> Row:

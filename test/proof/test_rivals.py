@@ -76,6 +76,12 @@ def test_the_table_puts_ours_first_and_says_what_does_not_apply() -> None:
     assert sindy[6:8] == ("1.50", "0.10")
 
 
+def test_a_world_that_our_table_leaves_out_is_left_out_here() -> None:
+    theirs = [line(seed, "one", sbi=said(alarm=False)) for seed in (1, 2)]
+    strong, faint = [{"suite": "main", "seed": s, "effects": [{"rms_m": m}]} for s, m in ((1, 2e-3), (2, 0.4e-3))]
+    assert rows(theirs, [strong, faint])[0][5].startswith("0 of 1 ")
+
+
 def test_a_page_gets_the_table_between_its_own_markers(tmp_path: Path) -> None:
     page = tmp_path / "proof.md"
     page.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
