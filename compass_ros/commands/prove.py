@@ -54,7 +54,7 @@ def prove(
     if not found and not rivals:
         raise ConfigError(f"{out}: no results; `compass prove` without --table makes them")
     for (name, by), among in groups(found).items():
-        _print(f"{name}, method {by}: {len(among)} worlds", among)
+        _print(f"{name}, method {by}: {lines.counted(among)}", among)
     theirs = list(lines.read(rivals_out).values())
     _print_rivals(theirs, found)
     if page:
@@ -96,12 +96,13 @@ def _print_rivals(theirs: list[Line], ours: list[Line]) -> None:
     from rich.markup import escape
     from rich.table import Table
 
+    from compass_ros.proof.lines import counted
     from compass_ros.proof.rivals_table import HEAD, NAMED, by_suite, rows
 
     for suite, among in by_suite(theirs).items():
         found = rows(among, ours)
         for first, last in ((1, NAMED), (NAMED, len(HEAD))):  # in two parts: nine columns are too many for a terminal
-            shown = Table(title=f"{suite}: {len(among)} worlds through other methods" if first == 1 else None)
+            shown = Table(title=f"{suite}: {counted(among)} through other methods" if first == 1 else None)
             shown.add_column(HEAD[0], no_wrap=True)
             for head in HEAD[first:last]:
                 shown.add_column(escape(head), justify="right", overflow="fold")

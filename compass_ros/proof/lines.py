@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,11 @@ class Key:
 
 def key(line: Line) -> Key:
     return Key(str(line["suite"]), int(line["seed"]), str(line["method"]))
+
+
+def counted(lines: Collection[Line]) -> str:
+    """How many worlds, in words."""
+    return f"{len(lines)} world{'' if len(lines) == 1 else 's'}"
 
 
 def read(path: Path) -> dict[Key, Line]:

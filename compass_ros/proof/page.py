@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from compass_ros.proof.lines import Line
+from compass_ros.proof.lines import Line, counted
 from compass_ros.proof.statistics import Row, table
 from compass_ros.reporting.markdown import markdown_table, replace_between
 
@@ -26,7 +26,7 @@ def markdown(found: Iterable[Line]) -> str:
     parts = []
     for (suite, method), among in groups(found).items():
         commits = ", ".join(sorted({str(line["commit"]) for line in among}))
-        parts.append(f"### {suite}, method {method}: {len(among)} worlds (commit {commits})\n")
+        parts.append(f"### {suite}, method {method}: {counted(among)} (commit {commits})\n")
         parts.append(_table(table(among)))
         parts.append(_wrong(among))
     return "\n".join(parts)

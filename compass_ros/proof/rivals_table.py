@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from compass_ros.proof.lines import Line
+from compass_ros.proof.lines import Line, counted
 from compass_ros.proof.statistics import felt, wilson
 from compass_ros.reporting.markdown import markdown_table, replace_between
 
@@ -63,8 +63,7 @@ def markdown(rivals: Iterable[Line], ours: Iterable[Line]) -> str:
     for suite, among in by_suite(rivals).items():
         commits = ", ".join(sorted({str(line["commit"]) for line in among}))
         failed = sum(1 for line in among if not line.get("rivals"))
-        worlds = f"{len(among)} world{'' if len(among) == 1 else 's'}"
-        parts.append(f"### {suite}: {worlds}, {failed} of them failed (commit {commits})\n")
+        parts.append(f"### {suite}: {counted(among)}, {failed} of them failed (commit {commits})\n")
         parts.append(markdown_table(HEAD, rows(among, own)) + "\n")
     return "\n".join(parts) or "No run yet.\n"
 

@@ -82,7 +82,7 @@ def _small(found: Sequence[Line]) -> list[Row]:
 
 
 def felt(line: Line) -> bool:
-    """Whether each effect moves the pucks enough after the best parameters: those of the answer, or those found."""
+    """Whether each effect moves the pucks enough: by its size in the answer, and by what the calibration leaves."""
     sizes = [effect["rms_m"] for effect in line.get("effects") or ()]
     if sizes and (left := _mark(line, "left_m")) is not None:
         sizes.append(left)
