@@ -14,7 +14,7 @@ from compass_ros.proof.statistics import felt, wilson
 from compass_ros.reporting.markdown import markdown_table, replace_between
 
 BEGIN, END = "<!-- rivals: begin -->\n", "<!-- rivals: end -->"
-OURS = "compass_ros"
+OURS, OUR_METHOD = "compass_ros", "default"
 HEAD = (
     *("method", "one effect: named right", "two effects: both", "outside the library: misnamed"),
     *("nothing missing: false alarm", "anything missing: alarm"),
@@ -40,7 +40,7 @@ class Said:
 
 def rows(rivals: Iterable[Line], ours: Iterable[Line]) -> list[tuple[str, ...]]:
     """Cells of the table for the worlds of one suite that the rivals have judged, less those that ours leaves out."""
-    own = list(ours)
+    own = [line for line in ours if line["method"] == OUR_METHOD]
     faint = {_world(line) for line in own if not felt(line)}
     done = [line for line in rivals if line.get("rivals") and _world(line) not in faint]
     seeds = {_world(line) for line in done}

@@ -64,11 +64,12 @@ def test_the_table_puts_ours_first_and_says_what_does_not_apply() -> None:
     marks = {"kind": "one", "right": True, "misnamed": False, "verdict": "named"}
     held = {"calibrated": 3e-3, "with_effects": 1.5e-3, "floor": 1.4e-3}
     ours = [
-        {"suite": "main", "seed": seed, "marks": marks | {"held_out_m": held}, "seconds": {"calibrate": 60.0}}
-        for seed in (1, 7)
-    ]
+        {"suite": "main", "seed": seed, "method": method, "marks": marks | {"held_out_m": held},
+         "seconds": {"calibrate": 60.0}}
+        for seed, method in ((1, "default"), (7, "default"), (1, "compass"))
+    ]  # fmt: skip
     first, sbi, sindy = rows(theirs, ours)
-    assert first[:2] == ("compass_ros", "1 of 1 (21 to 100 %)"), "seed 7 is not a world of the rivals"
+    assert first[:2] == ("compass_ros", "1 of 1 (21 to 100 %)"), "7 is no world of the rivals, compass not our method"
     assert first[6:] == ("1.50", "0.10", "60")
     assert sbi[1] == "n/a"
     assert sbi[4].startswith("1 of 1")
@@ -78,7 +79,10 @@ def test_the_table_puts_ours_first_and_says_what_does_not_apply() -> None:
 
 def test_a_world_that_our_table_leaves_out_is_left_out_here() -> None:
     theirs = [line(seed, "one", sbi=said(alarm=False)) for seed in (1, 2)]
-    strong, faint = [{"suite": "main", "seed": s, "effects": [{"rms_m": m}]} for s, m in ((1, 2e-3), (2, 0.4e-3))]
+    strong, faint = [
+        {"suite": "main", "seed": seed, "method": "default", "effects": [{"rms_m": rms_m}]}
+        for seed, rms_m in ((1, 2e-3), (2, 0.4e-3))
+    ]
     assert rows(theirs, [strong, faint])[0][5].startswith("0 of 1 ")
 
 
