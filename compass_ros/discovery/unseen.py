@@ -21,6 +21,7 @@ from compass_ros.calibration.refine import (
 )
 from compass_ros.calibration.residuals import covariance
 from compass_ros.discovery.joint import Joint
+from compass_ros.discovery.remainder import noise_cost, noise_level
 from compass_ros.types import Floats, Ints
 
 HELD_OUT_SHARE = 0.4
@@ -74,7 +75,7 @@ class HeldOut:
     plain: Prediction
     """Of the model without effects."""
     floor: float
-    """Surprise by noise alone."""
+    """Surprise by noise alone, of the kind that the fitted episodes have."""
     _asked: dict[Joint, Prediction] = field(default_factory=dict, repr=False)
 
     @property
@@ -144,7 +145,7 @@ def held_out(judge: Likelihood, fitted: Likelihood, fit: Fit) -> HeldOut:
     point = with_launches(judge, fit.point.values, untaught.which, untaught.steps)
     linear = linearise(judge, point, fit.free, difference_steps(fit.linear))
     calm = calmed(judge, linear)
-    floor = noise_cost(calm, replace(fit, free=np.zeros(0, dtype=np.int64)))
+    floor = noise_level(fitted, fit) * noise_cost(calm, fit.robust)
     return HeldOut(calm, untaught, predict(calm, fitted, fit, untaught), floor)
 
 
@@ -192,15 +193,3 @@ def predict(unseen: Likelihood, fitted: Likelihood, fit: Fit, untaught: Untaught
     volume = np.linalg.slogdet(inner)[1] - np.linalg.slogdet(common)[1] - np.linalg.slogdet(precision)[1]
     surprise = loss + 0.5 * float((away + move) @ precision @ (away + move)) + 0.5 * float(volume)
     return Prediction(surprise, 0.5 * float(np.sum(robust_loss(residual, ROBUST))))
-
-
-def noise_cost(likelihood: Likelihood, fit: Fit) -> float:
-    """Cost that unit normal noise leaves under the robust loss, less what the free parameters take."""
-    grid = np.linspace(-6, 6, 2001)
-    density = np.exp(-0.5 * grid**2) / np.sqrt(2 * np.pi)
-    loss = 0.5 * robust_loss(grid, fit.robust)
-    noise = likelihood.sigma.min(axis=(0, 1))  # before any collision there is nothing but the tracker's noise
-    quiet = noise**2 / likelihood.sigma**2  # where sigma holds more than noise, noise is quieter than one sigma
-    of_noise = float(np.sum(density * loss) * (grid[1] - grid[0]))
-    measured = ~np.isnan(likelihood.measured)
-    return of_noise * float(np.sum(np.broadcast_to(quiet, measured.shape)[measured])) - 0.5 * len(fit.free)
