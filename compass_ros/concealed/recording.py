@@ -37,6 +37,11 @@ class TrackerNoise:
     missing: float = 0.0
     """Share of the frames in which a puck is not seen."""
 
+    @property
+    def repeated(self) -> float:
+        """Frames that one independent measurement is worth."""
+        return (1 + self.correlation) / (1 - self.correlation)
+
 
 NOISES = {
     "white": TrackerNoise(),

@@ -26,6 +26,8 @@ class Judge:
     time_s: Floats
     """(S, F) [s]."""
     base: Played
+    repeated: float = 1.0
+    """Frames that one independent measurement is worth, by the noise of the recordings."""
 
     def change(self, ingredients: Sequence[Ingredient]) -> Floats:
         """(S, F, 4) what laws move [m]."""

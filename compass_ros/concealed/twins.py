@@ -66,9 +66,8 @@ def _match(name: str, left: Floats, judge: Judge) -> _Match | None:
         design = np.stack([judge.absorber.left(judge.change([part])).ravel() for part in parts], axis=1)
         amounts = np.linalg.lstsq(design, left, rcond=None)[0]
         fitted = design @ amounts
-        found = _Match(
-            float(np.linalg.norm(fitted) / np.linalg.norm(left)), 0.5 * float(np.sum((left - fitted) ** 2)) / NOISE**2
-        )
+        loss = 0.5 * float(np.sum((left - fitted) ** 2)) / NOISE**2 / judge.repeated
+        found = _Match(float(np.linalg.norm(fitted) / np.linalg.norm(left)), loss)
         whole = _combined(parts, amounts)
         if whole is None:
             return best

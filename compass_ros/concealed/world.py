@@ -77,7 +77,7 @@ def conceal(cell: Cell, wishes: Wishes) -> World:
     values = wrong_parameters(cell, streams["parameters"])
     inputs = choose_shots(cell, values, SHOTS, streams["shots"])
     time_s = frame_times(cell.duration, SHOTS, streams["frames"])
-    judges = _judges(cell, values, inputs)
+    judges = _judges(cell, values, inputs, NOISES[wishes.noise].repeated)
     found = _effects(kind, wishes, judges[0], streams["laws"])
     ingredients = [s.ingredient for s in found]
     played = judges[0].table.play(ingredients) if found else judges[0].base
@@ -124,13 +124,13 @@ def wrong_parameters(cell: Cell, rng: Generator) -> Floats:
     return np.asarray(np.clip(cell.defaults + rng.uniform(-1, 1, len(half)) * half, low, high))
 
 
-def _judges(cell: Cell, values: Floats, inputs: Floats) -> tuple[Judge, Judge]:
+def _judges(cell: Cell, values: Floats, inputs: Floats, repeated: float) -> tuple[Judge, Judge]:
     """The world without laws, on its own clock and on a coarser one."""
     times = np.arange(round(cell.duration * 60)) / 60
     absorber = Absorber(cell, values, inputs, times)
     tiled = np.tile(times, (len(inputs), 1))
     tables = [Table(cell, values, inputs, step) for step in (TIME_STEP, COARSE_STEP)]
-    fine, coarse = (Judge(table, absorber, tiled, table.play()) for table in tables)
+    fine, coarse = (Judge(table, absorber, tiled, table.play(), repeated) for table in tables)
     return fine, coarse
 
 

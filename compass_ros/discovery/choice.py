@@ -95,13 +95,17 @@ class Choice:
         predicts = share >= PREDICTS or (share >= FORM_SHARE and unseen.remainder(joint) < SMALL)
         return self.enough(joint) and unseen.helps(joint) and predicts and not joint.stands_in
 
+    def complete(self) -> list[Joint]:
+        """Models that leave nothing of the fitted episodes."""
+        models = [*self.singles, *([self.pair] if self.pair else [])]
+        return [j for j in models if self.enough(j) and self.remainder(j) < SMALL]
+
     def untaught(self, unseen: HeldOut) -> bool:
         """Whether a model leaves nothing of the fitted episodes and fails on the others.
 
         They have something then that no fitted one shows.
         """
-        models = [*self.singles, *([self.pair] if self.pair else [])]
-        complete = [j for j in models if self.enough(j) and self.remainder(j) < SMALL]
+        complete = self.complete()
         return bool(complete) and not any(unseen.helps(j) for j in complete)
 
     def enough(self, joint: Joint) -> bool:

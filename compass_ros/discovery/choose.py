@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from compass_ros.calibration.least_squares import Point, minimise
+from compass_ros.discovery.anew import contacts_anew
 from compass_ros.discovery.beginning import OF_TWINS, begun, in_place_of
 from compass_ros.discovery.candidates import Candidate, scattered
 from compass_ros.discovery.choice import LEADERS, OF_LIMIT, PREDICTS, Choice, comes_to, evidence, undecided
-from compass_ros.discovery.joint import Joint, converge, finished, from_first_guess, from_second_start, widened, widths
+from compass_ros.discovery.joint import Joint, best_of, converge, finished, from_second_start, widened, widths
 from compass_ros.discovery.scatter import fit_scattered, follows_command, settled_scatter
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import screen
@@ -76,7 +77,8 @@ def choose(
             choice = choice.of([from_second_start(best), *others])
         if choice.good(unseen):
             return _concluded(choice, space, candidates, unseen)
-    if other := at_other_rates(space, scores):
+    choice = _tried(choice, ([j] for j in contacts_anew(space, scores)), unseen)
+    if not choice.good(unseen) and (other := at_other_rates(space, scores)):
         choice = _tried(choice, [[converge(other, slight)]], unseen)
     if not first and not choice.good(unseen):
         choice = _tried(choice, beginnings, unseen)
@@ -158,14 +160,14 @@ def _of_singles(choice: Choice, space: Space, slight: float) -> list[Joint]:
     """
     best, *others = different(choice.singles)
     kinds = [[j for j in others if Candidate(j.added[0]).by_force == by_force] for by_force in (True, False)]
-    found = []
+    starts = []
     for other in (of_kind[0] for of_kind in kinds if of_kind):
         added = (*best.added, *other.added)
         numbers = np.concatenate([j.fit.point.values[len(space.fit.point.values) :] for j in (best, other)])
         lengths = widths([q for attached in added for q in attached.effect.quantities])
-        starts = [np.where(lengths > 0, np.maximum(lengths, width * numbers), numbers) for width in WIDTHS]
-        found += [from_first_guess(space, added, start) for start in (starts if lengths.any() else starts[:1])]
-    return [converge(j, slight) for j in sorted(found, key=worth)[:1]]
+        wide = [np.where(lengths > 0, np.maximum(lengths, width * numbers), numbers) for width in WIDTHS]
+        starts += [(added, start) for start in (wide if lengths.any() else wide[:1])]
+    return [converge(j, slight) for j in sorted(best_of(space, starts, 2), key=worth)[:1]]
 
 
 def _with_each(pair: Joint, choice: Choice, space: Space) -> Choice:

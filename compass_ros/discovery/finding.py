@@ -59,7 +59,7 @@ class Discovery:
     after: TableMap | None = None
     warnings: Sequence[str] = ()
     untaught: bool = False
-    """What leaves nothing of the fitted episodes fails on the others: they have something that no fitted one shows."""
+    """What leaves nothing of the fitted episodes does not predict the others: they have what no fitted one shows."""
 
 
 def not_evaluated(reason: str) -> Discovery:
@@ -106,7 +106,7 @@ class Finding:
         joint = choice.verdict(unseen)
         if joint is not None:
             return self.named(joint, choice, (choice.equal,) if len(joint.added) == 1 else ((), ()))
-        return replace(self.unknown(choice, unseen), untaught=choice.untaught(unseen))
+        return replace(self.unknown(choice, unseen), untaught=bool(choice.complete()))
 
     def named(self, joint: Joint, choice: Choice, equal: tuple[tuple[Joint, ...], ...]) -> Discovery:
         """One or two effects with values, errors and evidence."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from compass_ros.calibration.least_squares import (
     normal_equations,
 )
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import freed, growing, settled
+from compass_ros.calibration.refine import ROBUST, freed, growing, settled
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, Quantity
@@ -26,6 +27,8 @@ from compass_ros.types import Floats, Ints
 
 _SHARES = (0.0, 0.15, 0.4, 0.7, 1.0)
 """Parts of the first-order step that are tried as a start."""
+HALF = 4
+"""Horizons after which fits from several starts are compared: half of the episode."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,14 +143,36 @@ def finished(joint: Joint) -> Joint:
     return replace(joint, fit=settled(joint.likelihood, joint.fit), converged=True, settled=True)
 
 
-def from_first_guess(space: Space, added: tuple[Attached, ...], numbers: Floats) -> Joint:
-    """A fit that begins at the cell's first guess with the (q,) numbers of effects, and of those that are there."""
+def growth(space: Space, added: tuple[Attached, ...], numbers: Floats) -> Iterator[Joint]:
+    """Fits on a growing horizon, from the cell's first guess and the (q,) numbers of effects, and of those there are.
+
+    The strongest parameters are free, and the effects' amplitudes. The last one is of the whole episodes.
+    """
     simulator, likelihood = widened(space.simulator, space.likelihood, added)
     values = likelihood.prior_mean.copy()
     there = np.arange(len(simulator.cell.parameters), len(space.fit.point.values))
     values[there] = space.fit.point.values[there]
     values[-len(numbers) :] = numbers
-    return Joint(simulator, likelihood, _grown(simulator, likelihood, values, space.fit.robust), added)
+    for part, fit in growing(likelihood, values, _shapes(simulator)):
+        yield Joint(simulator, part, fit, added)
+
+
+def best_of(space: Space, starts: Sequence[tuple[tuple[Attached, ...], Floats]], kept: int) -> Iterator[Joint]:
+    """Fits from the first guess of those `kept` of several effects, or numbers, that explain the first half best.
+
+    Each is followed to the whole episodes when it is asked for.
+    """
+    growths = [growth(space, added, numbers) for added, numbers in starts]
+    halves = [list(islice(grows, HALF))[-1] for grows in growths]
+    left = [float(cost(half.likelihood, [half.fit.point], ROBUST)[0][0]) for half in halves]
+    for i in np.argsort(left, kind="stable")[:kept]:
+        *_, last = growths[i]
+        yield _grown_up(last, space.fit.robust)
+
+
+def _grown_up(joint: Joint, robust: float) -> Joint:
+    """A fit that has grown to the whole episodes, with all that is felt free."""
+    return replace(joint, fit=_freed(joint.simulator, joint.likelihood, joint.fit, robust))
 
 
 def grown(joint: Joint, attached: Attached, simulator: Simulator, likelihood: Likelihood, robust: float) -> Joint:
@@ -160,17 +185,24 @@ def grown(joint: Joint, attached: Attached, simulator: Simulator, likelihood: Li
 
 
 def _grown(simulator: Simulator, likelihood: Likelihood, values: Floats, robust: float) -> Fit:
-    """A fit on a growing horizon, shapes as they are until it is whole, and then all that is felt free.
+    """A fit on a growing horizon, shapes as they are until it is whole, and then all that is felt free."""
+    *_, (_, begun) = growing(likelihood, values, _shapes(simulator))
+    return _freed(simulator, likelihood, begun, robust)
 
-    The loss may have been wider on the way; in the end it is weighed by the one that is asked for.
-    """
-    of_effects = np.arange(len(simulator.cell.parameters), len(values))
-    shapes = [not q.amplitude for attached in simulator.effects for q in attached.effect.quantities]
-    *_, (_, begun) = growing(likelihood, values, of_effects[shapes])
+
+def _freed(simulator: Simulator, likelihood: Likelihood, begun: Fit, robust: float) -> Fit:
+    """A fit with all free that is felt. The loss may have been wider; in the end it is the one that is asked for."""
+    of_effects = np.arange(len(simulator.cell.parameters), len(begun.point.values))
     fit = freed(likelihood, begun.point, 5, robust, of_effects)[1]
     costs, residuals = cost(likelihood, [fit.point], robust)
     point, linear = replace(fit.point, cost=float(costs[0])), replace(fit.linear, residual=residuals[0])
     return replace(fit, point=point, linear=linear, robust=robust)
+
+
+def _shapes(simulator: Simulator) -> Ints:
+    """Indices of the effects' quantities that are no amplitudes."""
+    first = len(simulator.cell.parameters)
+    return first + np.flatnonzero([not q.amplitude for a in simulator.effects for q in a.effect.quantities])
 
 
 def _scaled(score: Score, share: float) -> Floats:

@@ -39,12 +39,12 @@ def noise_cost(likelihood: Likelihood, robust: float) -> float:
 
 
 def noise_level(likelihood: Likelihood, fit: Fit) -> float:
-    """Cost of the noise in the fitted episodes, beside that of unit noise; at least 1. What a fit misses does not count.
+    """Cost of the noise in the fitted episodes, beside that of unit noise; at least 1.
 
-    At rest nothing is seen of stamps that are a little off, and little of frames that are lost. Both change from one
-    frame to the next, so they show in second differences, in which what follows the motion is gone, of frames that the
-    fit can follow. Those of noise of correlation r (AR(1)) have 1 - (4 r - r^2) / 3 of the variance of white noise;
-    what is more is white.
+    What a fit misses does not count. At rest nothing is seen of stamps that are a little off, and little of frames that
+    are lost. Both change from one frame to the next, so they show in second differences, in which what follows the
+    motion is gone, of frames that the fit can follow. Those of noise of correlation r (AR(1)) have 1 - (4 r - r^2) / 3
+    of the variance of white noise; what is more is white.
     """
     residual = residual_at(likelihood, fit.point)
     seen = ~np.isnan(likelihood.measured) & (doubted(likelihood, residual) == 1.0)[:, :, None]

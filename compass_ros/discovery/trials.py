@@ -10,7 +10,7 @@ import numpy as np
 
 from compass_ros.calibration.least_squares import minimise
 from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.joint import Joint, fit_jointly, from_first_guess
+from compass_ros.discovery.joint import Joint, best_of, fit_jointly
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.types import Bools
 
@@ -54,7 +54,7 @@ def at_other_rates(space: Space, scores: Sequence[Score]) -> Joint | None:
     quantities = best.candidate.attached.effect.quantities
     low, high = ([getattr(q, side) for q in quantities] for side in ("low", "high"))
     tried = [np.clip(np.where(_rates(best), ratio, 1.0) * best.numbers, low, high) for ratio in RATIOS]
-    return min((from_first_guess(space, (best.candidate.attached,), numbers) for numbers in tried), key=worth)
+    return next(best_of(space, [((best.candidate.attached,), numbers) for numbers in tried], 1))
 
 
 def _rates(score: Score) -> Bools:
