@@ -77,6 +77,8 @@ def choose(
             choice = choice.of([from_second_start(best), *others])
         if choice.good(unseen):
             return _concluded(choice, space, candidates, unseen)
+    if any(choice.remainder(j) < SEEN for j in choice.complete()):  # nothing is left to find but in other episodes
+        return choice
     choice = _tried(choice, ([j] for j in contacts_anew(space, scores)), unseen)
     if not choice.good(unseen) and (other := at_other_rates(space, scores)):
         choice = _tried(choice, [[converge(other, slight)]], unseen)
@@ -194,13 +196,14 @@ def _concluded(choice: Choice, space: Space, candidates: Sequence[Candidate], un
 
 
 def _in_its_place(first: Joint, choice: Choice, space: Space, candidates: Sequence[Candidate]) -> list[Joint]:
-    """Twins of an effect, fitted from where it has led the parameters, where none of their fits was enough.
+    """Twins of an effect, fitted from where it has led the parameters, where none of their fits came as far.
 
-    What is tried first may be enough before its twins are tried. Fields are left out: their place had to be searched.
+    What is tried first may be enough before its twins are tried, or before they have converged. Fields are left out:
+    their place had to be searched.
     """
-    enough = {j.name for j in choice.singles if choice.enough(j)}
+    near = {j.name for j in choice.singles if worth(j) - worth(first) < EQUAL}
     twins = next((c.twins for c in candidates if c.attached == first.added[0]), ())
-    untried = [c for c in map(Candidate, twins) if c.name not in enough and not c.by_force]
+    untried = [c for c in map(Candidate, twins) if c.name not in near and not c.by_force]
     return [
         converge(in_place_of(first, c.attached, space.simulator, space.likelihood), SLIGHT * choice.excess)
         for c in different(untried)
@@ -255,8 +258,12 @@ def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOu
     if not pairs:
         return choice
     judged = _beside(first, pairs, choice, unseen)
+    if not judged.two:
+        pairs += _with_a_limit([first], candidates, slight)
+        judged = _beside(first, pairs, choice, unseen)
     if not judged.two and unseen.share(first) < PREDICTS:
-        judged = _beside(first, [*pairs, *_with_contacts(first, candidates, slight)], choice, unseen)
+        pairs += _with_contacts(first, candidates, slight)
+        judged = _beside(first, pairs, choice, unseen)
     return judged
 
 

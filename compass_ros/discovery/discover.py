@@ -65,8 +65,8 @@ def discover(
     unseen = held_out(judge, space.likelihood, space.fit)
     if not noticed(space, scores, null, noise, unseen):
         return found.none(scores)
-    excess = smooth_excess(space.likelihood, space.fit.point, space.fit.robust)
-    cause = numerical_cause(space, 0.5 * excess * space.likelihood.measurements)
+    excess = 0.5 * smooth_excess(space.likelihood, space.fit.point, space.fit.robust) * space.likelihood.measurements
+    cause = numerical_cause(space, max(excess, scores[0].gain if scores else 0.0))
     if cause:
         return found.failed(f"No verdict: {cause}. That is the simulator's numerics, not physics.")
     tell("fit effects", 0.4)

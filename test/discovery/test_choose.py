@@ -94,6 +94,9 @@ def test_an_effect_that_was_tried_first_does_not_hide_its_twin() -> None:
     assert twin.fit.point.cost == pytest.approx(first.fit.point.cost, abs=3.0)
     assert twin.fit.point.values[-1] == pytest.approx(0.046, abs=0.002)
     assert _in_its_place(first, choice.of([first, twin]), space, asked) == []
+    behind = replace(twin, fit=replace(twin.fit, point=replace(twin.fit.point, cost=twin.fit.point.cost + 10.0)))
+    (again,) = _in_its_place(first, choice.of([first, behind]), space, asked)
+    assert again.fit.point.cost == pytest.approx(twin.fit.point.cost, abs=1.0), "it had not converged"
 
 
 @pytest.mark.slow
