@@ -23,6 +23,9 @@ FORM_SHARE = 0.6
 """...if the effect explains at least this share."""
 PREDICTS = 0.92
 """Share of the held-out excess that what is named must remove, but for a SMALL remainder: less is another law's."""
+SEEN = 0.04
+"""Excess of chi-square that an effect which is enough must leave for another to be looked for beside it: less, 0.2 of
+the noise, is what its form gets wrong, and many a second effect would take some of that."""
 LITTLE, MANY_TIMES, SEVERAL = 0.12, 4.0, 2
 """Share that an effect may leave where at least so many others, fitted as well, leave so many times as much."""
 OF_LIMIT = 8.0
@@ -95,18 +98,21 @@ class Choice:
         predicts = share >= PREDICTS or (share >= FORM_SHARE and unseen.remainder(joint) < SMALL)
         return self.enough(joint) and unseen.helps(joint) and predicts and not joint.stands_in
 
-    def complete(self) -> list[Joint]:
-        """Models that leave nothing of the fitted episodes."""
-        models = [*self.singles, *([self.pair] if self.pair else [])]
-        return [j for j in models if self.enough(j) and self.remainder(j) < SMALL]
+    def complete(self) -> bool:
+        """Whether a model leaves nothing of the fitted episodes: what it does not predict, only others can show."""
+        return any(self.enough(j) and self.remainder(j) < SEEN and not j.stands_in for j in self._models)
 
     def untaught(self, unseen: HeldOut) -> bool:
-        """Whether a model leaves nothing of the fitted episodes and fails on the others.
+        """Whether a model leaves little of the fitted episodes and fails on the others.
 
         They have something then that no fitted one shows.
         """
-        complete = self.complete()
-        return bool(complete) and not any(unseen.helps(j) for j in complete)
+        models = [j for j in self._models if self.enough(j) and self.remainder(j) < SMALL]
+        return bool(models) and not any(unseen.helps(j) for j in models)
+
+    @property
+    def _models(self) -> list[Joint]:
+        return [*self.singles, *([self.pair] if self.pair else [])]
 
     def enough(self, joint: Joint) -> bool:
         """Whether a model explains what there is to explain."""

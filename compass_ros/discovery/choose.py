@@ -11,7 +11,7 @@ from compass_ros.calibration.least_squares import Point, minimise
 from compass_ros.discovery.anew import contacts_anew
 from compass_ros.discovery.beginning import OF_TWINS, begun, in_place_of
 from compass_ros.discovery.candidates import Candidate, scattered
-from compass_ros.discovery.choice import LEADERS, OF_LIMIT, PREDICTS, Choice, comes_to, evidence, undecided
+from compass_ros.discovery.choice import LEADERS, OF_LIMIT, PREDICTS, SEEN, Choice, comes_to, evidence, undecided
 from compass_ros.discovery.joint import Joint, best_of, converge, finished, from_second_start, widened, widths
 from compass_ros.discovery.scatter import fit_scattered, follows_command, settled_scatter
 from compass_ros.discovery.screen import Score, Space
@@ -25,9 +25,6 @@ EQUAL = 3.0
 """Log evidence within which two effects are told apart by nothing."""
 EQUAL_SHARE = 0.015
 """The same as a share of the excess: functional forms are never exactly right."""
-SEEN = 0.04
-"""Excess of chi-square that an effect which is enough must leave for another to be looked for beside it: less, 0.2 of
-the noise, is what its form gets wrong, and many a second effect would take some of that."""
 LEADS = 0.6
 """Share from which the best effect is surely one of two; below, the second best may be instead."""
 NEARLY = 0.85
@@ -77,7 +74,7 @@ def choose(
             choice = choice.of([from_second_start(best), *others])
         if choice.good(unseen):
             return _concluded(choice, space, candidates, unseen)
-    if any(choice.remainder(j) < SEEN for j in choice.complete()):  # nothing is left to find but in other episodes
+    if choice.complete():
         return choice
     choice = _tried(choice, ([j] for j in contacts_anew(space, scores)), unseen)
     if not choice.good(unseen) and (other := at_other_rates(space, scores)):

@@ -106,7 +106,7 @@ class Finding:
         joint = choice.verdict(unseen)
         if joint is not None:
             return self.named(joint, choice, (choice.equal,) if len(joint.added) == 1 else ((), ()))
-        return replace(self.unknown(choice, unseen), untaught=bool(choice.complete()))
+        return replace(self.unknown(choice, unseen), untaught=choice.complete() or choice.untaught(unseen))
 
     def named(self, joint: Joint, choice: Choice, equal: tuple[tuple[Joint, ...], ...]) -> Discovery:
         """One or two effects with values, errors and evidence."""
