@@ -98,6 +98,8 @@ def test_what_explains_all_that_was_fitted_and_fails_on_the_others_was_not_taugh
         for effect, size in ((DRAG, 0.3), (RIVALS[0], 0.5))
     )
     choice = Choice((whole,), None, excess=1000.0, floor=0.0)
+    assert choice.complete()
+    assert not replace(choice, singles=(costing(whole, 30.0),)).complete(), "0.07 of chi-square are left to find"
     assert choice.untaught(other)
     assert not choice.untaught(same)
     assert not replace(choice, singles=(costing(whole, 300.0),)).untaught(other), "the fitted ones have more to teach"
