@@ -89,11 +89,13 @@ def choose(
 
 
 def _tried(choice: Choice, more: Iterable[list[Joint]], unseen: HeldOut) -> Choice:
-    """The same with more models, until one is enough."""
+    """The same with more models, the best of each list at its optimum, until one is enough."""
     for models in more:
-        choice = choice.of(sorted([*models, *choice.singles], key=worth))
-        ended = [finished(j) if j in models and choice.share(j) > LEADS else j for j in choice.singles]
-        choice = choice.of(sorted(ended, key=worth))
+        best, *others = sorted(models, key=worth)
+        choice = choice.of(sorted([best, *others, *choice.singles], key=worth))
+        if choice.share(best) > LEADS:
+            rest = [j for j in choice.singles if j is not best]
+            choice = choice.of(sorted([finished(best), *rest], key=worth))
         if choice.good(unseen):
             break
     return choice
