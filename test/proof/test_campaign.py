@@ -226,7 +226,8 @@ def test_the_page_keeps_its_text_and_lists_what_was_wrong(tmp_path: Path) -> Non
 
 def test_the_table_of_the_proof_says_its_units(run: Run) -> None:
     proof = Path(__file__).parents[2] / "proof"
-    status, out, _ = run("prove", "--table", "--out", proof / "results.jsonl", "--rivals-out", proof / "rivals.jsonl")
+    results, rivals = proof / "results-265f55f.jsonl", proof / "rivals-265f55f.jsonl"
+    status, out, _ = run("prove", "--table", "--out", results, "--rivals-out", rivals)
     assert status == 0
     assert "median [s]" in " ".join(out.replace("│", " ").split())
     assert "held out [mm]" in " ".join(out.replace("┃", " ").split())
