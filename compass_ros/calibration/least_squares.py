@@ -237,7 +237,7 @@ def minimise(
             point = replace(trials[best], cost=float(costs[best]))
             converged = exact and gained < tolerance
             keep = converged or not anew or (gained > 0.5 * hoped and gained > tolerance)
-            linear = _broyden(linear, residuals[best], move) if keep else None
+            linear = broyden(linear, residuals[best], move) if keep else None
             exact = False
         elif exact:
             damping *= 1e3
@@ -271,7 +271,7 @@ def move_between(likelihood: Likelihood, old: Point, new: Point, free: Ints) -> 
     return np.concatenate([values, launch.ravel()])
 
 
-def _broyden(linear: Linear, residual: Floats, move: Floats) -> Linear:
+def broyden(linear: Linear, residual: Floats, move: Floats) -> Linear:
     """The least change of the differences that predicts the step's residual (Broyden 1965, rank one per episode)."""
     episodes, p = len(residual), linear.jacobian.shape[-1]
     launches = move[p:].reshape(episodes, -1)

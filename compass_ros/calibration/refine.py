@@ -16,12 +16,14 @@ from compass_ros.calibration.least_squares import (
     Fit,
     Linear,
     Point,
+    broyden,
     central,
     cost,
     damped_step,
     difference_steps,
     linearise,
     minimise,
+    move_between,
     normal_equations,
     start,
 )
@@ -57,9 +59,9 @@ FINE = (0.1, 0.03)
 exact; the long ones see past what the simulator's steps at contacts do to a short one."""
 SETTLED = 0.3
 """Fall of the cost [log likelihood] by a step, or by all steps with the same differences, that is the last one."""
-UNEXPLAINED, WORTHWHILE = 1.5, 0.05
-"""Mean squared residual above which exact values are of no use, since something else differs; there each round must
-gain this share of what is left."""
+WORTHWHILE = 0.05
+"""Share of what is left above the noise that all steps with the same differences must gain: where something else
+differs, exact values are of no use."""
 _DAMPING = (1e-9, 1e-3, 1e-2, 1e-1, 1.0, 1e1)
 """Damping factors that are tried at once at the end."""
 
@@ -195,15 +197,12 @@ def settled(likelihood: Likelihood, fit: Fit) -> Fit:
     """The last steps to the optimum: Gauss-Newton with short central differences, which serve several steps.
 
     Along a valley that coupled parameters share, their effects cancel to a hundredth. Differences that are wrong by
-    some per cent, as those of `minimise` are, end there, tens of log likelihood above the optimum.
+    some per cent, as those of `minimise` are, end there, tens of log likelihood above the optimum. What a step has
+    shown is added to them (Broyden): the shapes of a field bend the valley.
     """
     free, robust, linear = fit.free, fit.robust, fit.linear
     point = replace(fit.point, cost=float(cost(likelihood, [fit.point], robust)[0][0]))
-    gained = np.inf
     for taken in range(SETTLING):
-        poor = 2 * point.cost > UNEXPLAINED * likelihood.measurements
-        if taken >= 2 and poor and gained < WORTHWHILE * (point.cost - 0.5 * likelihood.measurements):
-            break
         steps = FINE[taken % len(FINE)] * difference_steps(linear)
         linear = central(likelihood, point, free, steps, linear.onset if taken else None)
         linear = along_valleys(likelihood, point, linear, free, robust)
@@ -213,11 +212,12 @@ def settled(likelihood: Likelihood, fit: Fit) -> Fit:
             step = point.cost - best.cost
             if step <= 0:
                 break
-            point, linear = best, replace(linear, residual=residual)
+            linear = broyden(linear, residual, move_between(likelihood, point, best, free))
+            point = best
             if step < SETTLED:
                 break
-        gained = before - point.cost
-        if taken > 0 and gained < SETTLED:
+        unexplained = point.cost - 0.5 * likelihood.measurements
+        if taken > 0 and before - point.cost < max(SETTLED, WORTHWHILE * unexplained):
             break
     return replace(fit, point=point, linear=linear)
 

@@ -13,12 +13,15 @@ import numpy as np
 
 from compass_ros.calibration.least_squares import Linear, Point, cost, moved, robust_weight
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.types import Floats, Ints
+from compass_ros.types import Bools, Floats, Ints
 
 CANCELS = 0.1
 """Movement along a direction, as a share of what its parameters would do if they did not cancel."""
 ROUNDS = 2
 """How often directions are asked: the first step is short where roughness has passed for information."""
+FARTHER, ELSEWHERE = 2.0, 0.3
+"""What a direction must be to be asked then: so many times as long as those that were asked, or with so large a part
+across them."""
 
 
 def along_valleys(likelihood: Likelihood, point: Point, linear: Linear, free: Ints, robust: float) -> Linear:
@@ -30,10 +33,13 @@ def along_valleys(likelihood: Likelihood, point: Point, linear: Linear, free: In
     jacobian = linear.jacobian.reshape(-1, p).copy()
     weight = robust_weight(linear.residual, robust).reshape(-1, 1)
     launches = np.zeros(linear.launch_jacobian.shape[0] * linear.launch_jacobian.shape[-1])  # stay where they are
+    asked = np.zeros((0, p))
     for _ in range(ROUNDS):
         directions = _valleys((jacobian * weight).T @ jacobian)
+        directions = directions[_beyond(directions, asked)]
         if not len(directions):
             break
+        asked = directions
         sides = [moved(likelihood, point, free, np.concatenate([s, launches])) for d in directions for s in (d, -d)]
         residuals = cost(likelihood, sides, robust)[1].reshape(len(directions), 2, -1)
         for (up, down), there, back in zip(residuals, sides[::2], sides[1::2], strict=True):
@@ -42,6 +48,16 @@ def along_valleys(likelihood: Likelihood, point: Point, linear: Linear, free: In
             if length > 0:
                 jacobian += np.outer(up - down - jacobian @ secant, secant) / length
     return replace(linear, jacobian=jacobian.reshape(linear.jacobian.shape))
+
+
+def _beyond(directions: Floats, asked: Floats) -> Bools:
+    """(d,) which of (d, p) directions say more than those that were asked: twice as far, or elsewhere."""
+    if not len(asked):
+        return np.ones(len(directions), bool)
+    along = directions @ np.linalg.pinv(asked)  # in their lengths
+    elsewhere = directions - along @ asked
+    longer = np.linalg.norm(along, axis=1) > FARTHER
+    return np.asarray(longer | (np.linalg.norm(elsewhere, axis=1) > ELSEWHERE * np.linalg.norm(directions, axis=1)))
 
 
 def _valleys(gram: Floats) -> Floats:

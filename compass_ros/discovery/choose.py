@@ -74,7 +74,7 @@ def choose(
             choice = choice.of([from_second_start(best), *others])
         if choice.good(unseen):
             return _concluded(choice, space, candidates, unseen)
-    if choice.complete():
+    if choice.complete():  # more fits to these episodes would say nothing: others are held out
         return choice
     choice = _tried(choice, ([j] for j in contacts_anew(space, scores)), unseen)
     if not choice.good(unseen) and (other := at_other_rates(space, scores)):
@@ -184,13 +184,17 @@ def _enough(choice: Choice, pairs: Sequence[Joint], unseen: HeldOut) -> bool:
 
 
 def _concluded(choice: Choice, space: Space, candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
-    """One effect is enough: at its optimum, with what explains as much, and with a second one where that is needed."""
+    """One effect is enough: at its optimum, with what explains as much, and with a second one where that is needed.
+
+    One that reaches the noise floor has nowhere better to go; any other is fitted from a second start too.
+    """
     first = simplest(choice.good(unseen))
     choice = choice.of(sorted([*choice.singles, *_in_its_place(first, choice, space, candidates)], key=worth))
     first = simplest(choice.good(unseen))
     equal = _equals(first, choice, unseen)
     others = [j for j in choice.singles if j is not first]
-    choice = choice.of([from_second_start(first), *others])
+    at_floor = choice.remainder(first) < SEEN
+    choice = choice.of([finished(first) if at_floor else from_second_start(first), *others])
     return _with_second(replace(choice, equal=equal), candidates, unseen)
 
 

@@ -140,6 +140,8 @@ def from_second_start(joint: Joint) -> Joint:
 
 def finished(joint: Joint) -> Joint:
     """A fit at its optimum."""
+    if joint.settled:
+        return joint
     return replace(joint, fit=settled(joint.likelihood, joint.fit), converged=True, settled=True)
 
 

@@ -8,7 +8,7 @@ paths, so that shapes (a centre, a radius, a frequency) are searched without a r
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -22,8 +22,10 @@ from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Quantity
 from compass_ros.types import Floats
 
-STARTS = 3
+STARTS = 5
 """Places from which the shapes of a force are searched."""
+ELSEWHERE, APART = 0.5, 0.1
+"""Share of the best gain from which another shape is worth a sketch; how far off that is, as a share of a range."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,8 @@ class Score:
     """Fall of the cost [log likelihood]."""
     tangent: Floats
     """(D,) change of the weighted residual by the whole effect, not projected; D residuals of all episodes."""
+    elsewhere: tuple[Score, ...] = ()
+    """The same candidate at other shapes that gain almost as much: first order may take the wrong one for the best."""
 
     @property
     def name(self) -> str:
@@ -140,8 +144,12 @@ def solve(matrix: Floats, pull: Floats, low: Floats, high: Floats, prior: Floats
 
 def score_force(space: Space, candidate: Candidate) -> Score:
     """Best shape and amplitudes of a force: a grid over the shapes, then a simplex from its best points."""
+    best, *others = (_scored(space, candidate, shapes) for shapes in _best_shapes(space, candidate))
+    return replace(best, elsewhere=tuple(other for other in others if other.gain > ELSEWHERE * best.gain))
+
+
+def _scored(space: Space, candidate: Candidate, shapes: Floats) -> Score:
     quantities = candidate.attached.effect.quantities
-    shapes = _best_shapes(space, candidate)
     numbers, gain = _at(space, candidate, shapes)
     directions = np.diag([q.scale for q in quantities])[[i for i, q in enumerate(quantities) if q.amplitude]]
     if not candidate.attached.effect.superposes:
@@ -153,15 +161,15 @@ def score_force(space: Space, candidate: Candidate) -> Score:
     return Score(candidate, numbers, gain, columns @ sizes)
 
 
-def _best_shapes(space: Space, candidate: Candidate) -> Floats:
-    """(q,) the shapes that gain most, zeros for amplitudes.
+def _best_shapes(space: Space, candidate: Candidate) -> list[Floats]:
+    """(q,) shapes that gain most, each in its neighbourhood, the best first; zeros for amplitudes.
 
     The simplex starts from STARTS points of which no two are neighbours in the grid: they lead to different places.
     """
     quantities = candidate.attached.effect.quantities
     shape_of = [i for i, q in enumerate(quantities) if not q.amplitude]
     if not shape_of:
-        return np.zeros(len(quantities))
+        return [np.zeros(len(quantities))]
 
     def at(point: Floats) -> Floats:
         shapes = np.zeros(len(quantities))
@@ -182,7 +190,12 @@ def _best_shapes(space: Space, candidate: Candidate) -> Floats:
     bounds = [(quantities[i].low, quantities[i].high) for i in shape_of]
     options = {"maxfev": 60 * len(shape_of), "xatol": 1e-4, "fatol": 1e-2}
     found = [minimize(fall, points[i], method="Nelder-Mead", bounds=bounds, options=options) for i in starts]
-    return at(min(found, key=lambda one: float(one.fun)).x)
+    apart = APART * np.ptp(bounds, axis=1)
+    best: list[Floats] = []
+    for one in sorted(found, key=lambda one: float(one.fun)):
+        if all(np.any(np.abs(one.x - other) > apart) for other in best):
+            best.append(one.x)
+    return [at(point) for point in best]
 
 
 def _at(space: Space, candidate: Candidate, shapes: Floats) -> tuple[Floats, float]:
