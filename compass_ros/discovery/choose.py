@@ -5,17 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from compass_ros.calibration.least_squares import Point, minimise
 from compass_ros.discovery.anew import contacts_anew
-from compass_ros.discovery.beginning import OF_TWINS, begun, in_place_of
+from compass_ros.discovery.beginning import in_place_of
 from compass_ros.discovery.candidates import Candidate, scattered
-from compass_ros.discovery.choice import LEADERS, OF_LIMIT, PREDICTS, SEEN, Choice, comes_to, evidence, undecided
-from compass_ros.discovery.joint import Joint, best_of, converge, finished, from_second_start, widened, widths
+from compass_ros.discovery.choice import LEADERS, PREDICTS, SEEN, Choice, comes_to, evidence, undecided
+from compass_ros.discovery.joint import Joint, converge, finished, from_second_start
+from compass_ros.discovery.pairs import (
+    of_singles,
+    one_of,
+    promising_pairs,
+    with_a_limit,
+    with_a_rate,
+    with_contacts,
+)
 from compass_ros.discovery.scatter import fit_scattered, follows_command, settled_scatter
 from compass_ros.discovery.screen import Score, Space
-from compass_ros.discovery.tangents import screen
 from compass_ros.discovery.trials import TRIED, at_other_rates, different, further, sketched, worth
 from compass_ros.discovery.unseen import HeldOut
 
@@ -31,12 +35,6 @@ NEARLY = 0.85
 """Share from which the best effect, or the best pair, is fitted from a second start before it is given up."""
 WHOLLY = 0.95
 """Share that a scatter must explain."""
-CLOSE = 4.0
-"""How far behind the best pair a second one may be to be followed too, in steps that promise SLIGHT."""
-OF_CONTACTS, FOLLOWED = (0.06, 0.5), 2
-"""Sizes from which effects of contacts begin beside another effect, in their scale; how many fits are followed."""
-WIDTHS = (1.0, 0.5)
-"""Widths of fields that are tried where two effects meet, as parts of those that each has alone."""
 SLIGHT = 0.005
 """Share of the excess that a further step of a fit must promise: models are compared by shares of it."""
 
@@ -123,19 +121,19 @@ def _in_pairs(choice: Choice, space: Space, candidates: Sequence[Candidate], uns
     slight = SLIGHT * choice.excess
     best, *others = different(choice.singles)
     firsts = [best] if choice.share(best) > LEADS else [best, *(converge(j, slight, 4) for j in others[:1])]
-    pairs = _pairs(firsts, candidates, slight)
+    pairs = promising_pairs(firsts, candidates, slight)
     if not pairs:
         return choice
     if not _enough(choice, pairs, unseen):
-        pairs = sorted([*pairs, *_of_singles(choice, space, slight)], key=worth)
+        pairs = sorted([*pairs, *of_singles(choice, space, slight)], key=worth)
     led, choice = pairs[0], _with_each(pairs[0], choice, space)
     leading = different(choice.singles)[:2]
     second = next(j for j in choice.singles if j.added == led.added[1:])
     ways: tuple[Callable[[], list[Joint]], ...] = (
-        lambda: _with_a_rate(leading[0], candidates, slight),
-        lambda: _with_a_limit(leading, candidates, slight),
-        lambda: _with_contacts(leading[0], candidates, slight),
-        lambda: _pairs([second], candidates, slight),
+        lambda: with_a_rate(leading[0], candidates, slight),
+        lambda: with_a_limit(leading, candidates, slight),
+        lambda: with_contacts(leading[0], candidates, slight),
+        lambda: promising_pairs([second], candidates, slight),
     )
     for way in ways:
         if not _enough(choice, pairs, unseen):
@@ -153,27 +151,9 @@ def _in_pairs(choice: Choice, space: Space, candidates: Sequence[Candidate], uns
     return replace(choice, pair=pair)
 
 
-def _of_singles(choice: Choice, space: Space, slight: float) -> list[Joint]:
-    """The best effect with the best other force and the best that is none, as they stand alone, from the first guess.
-
-    Where two effects are large, the parameters bend for the one that is not there, and from there its like is not seen.
-    A field has grown wide to stand for both.
-    """
-    best, *others = different(choice.singles)
-    kinds = [[j for j in others if Candidate(j.added[0]).by_force == by_force] for by_force in (True, False)]
-    starts = []
-    for other in (of_kind[0] for of_kind in kinds if of_kind):
-        added = (*best.added, *other.added)
-        numbers = np.concatenate([j.fit.point.values[len(space.fit.point.values) :] for j in (best, other)])
-        lengths = widths([q for attached in added for q in attached.effect.quantities])
-        wide = [np.where(lengths > 0, np.maximum(lengths, width * numbers), numbers) for width in WIDTHS]
-        starts += [(added, start) for start in (wide if lengths.any() else wide[:1])]
-    return [converge(j, slight) for j in sorted(best_of(space, starts, 2), key=worth)[:1]]
-
-
 def _with_each(pair: Joint, choice: Choice, space: Space) -> Choice:
     """The same with each effect of a pair alone: the way to a pair may need an effect that is not there."""
-    alone = [further(_one_of(pair, i, space), SLIGHT * choice.excess, 5) for i in (0, 1)]
+    alone = [further(one_of(pair, i, space), SLIGHT * choice.excess, 5) for i in (0, 1)]
     return choice.of(sorted([*alone, *choice.singles], key=worth))
 
 
@@ -257,15 +237,15 @@ def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOu
     if choice.remainder(first) < SEEN:
         return choice
     slight = SLIGHT * choice.excess
-    pairs = _pairs([first], candidates, slight)
+    pairs = promising_pairs([first], candidates, slight)
     if not pairs:
         return choice
     judged = _beside(first, pairs, choice, unseen)
     if not judged.two:
-        pairs += _with_a_limit([first], candidates, slight)
+        pairs += with_a_limit([first], candidates, slight)
         judged = _beside(first, pairs, choice, unseen)
     if not judged.two and unseen.share(first) < PREDICTS:
-        pairs += _with_contacts(first, candidates, slight)
+        pairs += with_contacts(first, candidates, slight)
         judged = _beside(first, pairs, choice, unseen)
     return judged
 
@@ -276,82 +256,3 @@ def _beside(first: Joint, pairs: Sequence[Joint], choice: Choice, unseen: HeldOu
     choice = replace(choice.shown_by(pair), pair=pair)
     needed, predicts = choice.remainder(first) > SEEN, unseen.beside(first).helps(pair)
     return replace(choice, two=predicts and needed and choice.explains(pair, first))
-
-
-def _one_of(pair: Joint, i: int, space: Space) -> Joint:
-    """One effect of a pair without the other, fitted from where the pair stands.
-
-    The second, since the first was chosen when nothing stood beside it; and either, since the way there may have led
-    an effect to the right place that from the plain fit was led to a wrong one.
-    """
-    kept = pair.added[i]
-    simulator, likelihood = widened(space.simulator, space.likelihood, (kept,))
-    known, size = len(space.fit.point.values), len(pair.added[0].effect.quantities)
-    old = pair.fit.point
-    own = old.values[known : known + size] if i == 0 else old.values[known + size :]
-    values = np.concatenate([old.values[:known], own])
-    free = np.concatenate([pair.fit.free[pair.fit.free < known], np.arange(known, len(values))])
-    fit = minimise(likelihood, Point(values, old.launch, np.inf), free, 4, pair.fit.robust, 2.0, fresh=False)
-    return Joint(simulator, likelihood, fit, (kept,))
-
-
-def _pairs(firsts: Sequence[Joint], candidates: Sequence[Candidate], slight: float) -> list[Joint]:
-    """Some fits of one effect, each with the candidates that promise most of what it leaves: the best two, converged.
-
-    The second best only where it leaves little more than the best: two forms of drag differ in the episodes held out.
-    """
-    found: list[Joint] = []
-    for first in firsts:
-        there, scores = _beyond(first, candidates)
-        for sketch in sketched(there, scores)[:TRIED]:
-            joint = further(sketch, slight, 4)
-            found.append(replace(joint, added=(*first.added, *joint.added)))
-    best = sorted((further(j, slight, 5) for j in sorted(found, key=worth)[:3]), key=worth)
-    close = [j for j in best[:2] if worth(j) - worth(best[0]) < max(OF_LIMIT, CLOSE * slight)]
-    return sorted((converge(j, slight) for j in close), key=worth)
-
-
-def _beyond(first: Joint, candidates: Sequence[Candidate]) -> tuple[Space, list[Score]]:
-    """What one effect leaves, and what the other candidates promise there."""
-    own = {a.effect.name for a in first.added}
-    others = [c for c in candidates if c.name not in own]
-    return screen(first.simulator, first.likelihood, first.fit, others)
-
-
-def _with_a_rate(first: Joint, candidates: Sequence[Candidate], slight: float) -> list[Joint]:
-    """A fit of one effect with one that has a frequency, from the first guess: alone, it had bent the parameters."""
-    there, scores = _beyond(first, candidates)
-    other = at_other_rates(there, scores)
-    return [replace(converge(other, slight), added=(*first.added, *other.added))] if other else []
-
-
-def _with_a_limit(firsts: Sequence[Joint], candidates: Sequence[Candidate], slight: float) -> list[Joint]:
-    """A fit of some effects, each with a limit of the commands: below it first order says nothing of it."""
-    limits = [c for c in candidates if c.name == "velocity_saturation"]
-    return _begun_beside(firsts, limits, OF_TWINS, slight)
-
-
-def _with_contacts(first: Joint, candidates: Sequence[Candidate], slight: float) -> list[Joint]:
-    """A fit of one effect with an effect of contacts.
-
-    First order says little of those: dampings take a small one away, and have to give it back as it grows.
-    """
-    of_contacts = [c for c in candidates if c.attached.effect.channel == "contact" and c.attached.effect.on != "walls"]
-    return _begun_beside([first], different(of_contacts), OF_CONTACTS, slight)
-
-
-def _begun_beside(
-    firsts: Sequence[Joint], others: Sequence[Candidate], sizes: Sequence[float], slight: float
-) -> list[Joint]:
-    """The best fit of one effect with another that begins with the best of some sizes, if there is another."""
-    joints = [
-        replace(
-            begun(j.simulator, j.likelihood, j.fit.point, j.fit.free, j.fit.robust, other, sizes),
-            added=(*j.added, other.attached),
-        )
-        for j in firsts
-        for other in others
-        if other.name not in {a.effect.name for a in j.added}
-    ]
-    followed = [further(j, slight, 8) for j in sorted(joints, key=worth)[:FOLLOWED]]
-    return [converge(j, slight) for j in sorted(followed, key=worth)[:1]]

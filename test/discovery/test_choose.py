@@ -13,8 +13,9 @@ from compass_ros.discovery import choose
 from compass_ros.discovery.beginning import begun, in_place_of
 from compass_ros.discovery.candidates import Candidate, candidates
 from compass_ros.discovery.choice import undecided
-from compass_ros.discovery.choose import _in_its_place, _of_singles, _one_of, _with_contacts, _with_second
+from compass_ros.discovery.choose import _in_its_place, _with_second
 from compass_ros.discovery.joint import fit_jointly
+from compass_ros.discovery.pairs import of_singles, one_of, with_contacts
 from compass_ros.discovery.screen import Score
 from compass_ros.discovery.unseen import held_out
 from compass_ros.simulation.effects import EFFECTS, Attached
@@ -34,7 +35,7 @@ def test_one_of_a_pair_that_does_nothing_can_be_left_out_and_the_other_cannot(sw
     scores = [Score(Candidate(TILT), np.array([1e-4, 1e-4]), 1.0, nothing)]
     scores.insert(swirl_at, Score(Candidate(SWIRL), np.array(PLANTED) * [0.8, 0.9, 1.1, 1.1, 1.0], 100.0, nothing))
     pair = fit_jointly(space, scores, 4)
-    swirl, tilt = _one_of(pair, swirl_at, space), _one_of(pair, 1 - swirl_at, space)
+    swirl, tilt = one_of(pair, swirl_at, space), one_of(pair, 1 - swirl_at, space)
     assert (swirl.name, tilt.name) == ("swirl", "table_tilt")
     assert swirl.fit.point.cost < pair.fit.point.cost + 3.0
     assert tilt.fit.point.cost > 2.0 * pair.fit.point.cost
@@ -56,7 +57,7 @@ def test_what_an_impact_loses_is_found_beside_a_latency_though_dampings_take_it_
     fit = plain.fit
     first = begun(simulator(), plain.likelihood, fit.point, fit.free, fit.robust, Candidate(latency))
     asked = [c for c in candidates(simulator()) if c.name in ("rate_dependent_restitution", "tangential_impulse")]
-    (best,) = _with_contacts(first, asked, 1.0)
+    (best,) = with_contacts(first, asked, 1.0)
     assert best.added == (latency, slope)
     assert best.fit.point.cost < first.fit.point.cost - 30.0
     assert best.fit.point.values[-2:] == pytest.approx([0.03, 0.5], rel=0.1)
@@ -74,7 +75,7 @@ def test_contacts_are_asked_where_first_order_knows_no_second_effect(monkeypatch
         Score(Candidate(a), np.array(n), 1.0, np.zeros_like(space.residual))
         for a, n in ((latency, [0.03]), (TILT, [1e-5, 1e-5]))
     ]
-    monkeypatch.setattr(choose, "_pairs", lambda *_: [fit_jointly(space, scores, 4)])
+    monkeypatch.setattr(choose, "promising_pairs", lambda *_: [fit_jointly(space, scores, 4)])
     asked = [c for c in candidates(simulator()) if c.name in ("rate_dependent_restitution", "tangential_impulse")]
     choice = _with_second(undecided(space).of([first]), asked, unseen)
     assert choice.two
@@ -106,7 +107,7 @@ def test_two_effects_that_were_found_alone_are_put_together() -> None:
     space = space_of(recorded_with([SWIRL, latency], [*true, 0.03], np.concatenate([CALM, HELD_OUT])))
     alone = [joint(space, SWIRL, [0.03, -0.03, 0.03, 0.12, 0.5]), joint(space, latency, [0.02])]
     asked = [*alone, joint(space, TILT, [1e-3, 0.0])]
-    found = _of_singles(undecided(space).of(asked), space, 1.0)
+    found = of_singles(undecided(space).of(asked), space, 1.0)
     (best,) = (j for j in found if j.added == (SWIRL, latency))
     plain = undecided(space)
     assert plain.shown_by(best).share(best) > 0.98
