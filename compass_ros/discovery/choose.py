@@ -125,7 +125,7 @@ def _in_pairs(choice: Choice, space: Space, candidates: Sequence[Candidate], uns
     if not pairs:
         return choice
     if not _enough(choice, pairs, unseen):
-        pairs = sorted([*pairs, *of_singles(choice, space, slight)], key=worth)
+        pairs = sorted([*pairs, *of_singles(firsts, choice, space, slight)], key=worth)
     led, choice = pairs[0], _with_each(pairs[0], choice, space)
     leading = different(choice.singles)[:2]
     second = next(j for j in choice.singles if j.added == led.added[1:])

@@ -40,18 +40,21 @@ def promising_pairs(firsts: Sequence[Joint], candidates: Sequence[Candidate], sl
     return sorted((converge(j, slight) for j in close), key=worth)
 
 
-def of_singles(choice: Choice, space: Space, slight: float) -> list[Joint]:
-    """The best effect with the best other force and the best that is none, as they stand alone, from the first guess.
+def of_singles(firsts: Sequence[Joint], choice: Choice, space: Space, slight: float) -> list[Joint]:
+    """Some effects with the best other force and the best that is none, as they stand alone, from the first guess.
 
     Where two effects are large, the parameters bend for the one that is not there, and from there its like is not seen.
     A field has grown wide to stand for both.
     """
-    best, *others = different(choice.singles)
-    kinds = [[j for j in others if Candidate(j.added[0]).by_force == by_force] for by_force in (True, False)]
+    singles, pairs = different(choice.singles), {}
+    for first in firsts:
+        others = [j for j in singles if j.name != first.name]
+        kinds = [[j for j in others if Candidate(j.added[0]).by_force == by_force] for by_force in (True, False)]
+        pairs.update({frozenset((first.name, kind[0].name)): (first, kind[0]) for kind in kinds if kind})
     starts = []
-    for other in (of_kind[0] for of_kind in kinds if of_kind):
-        added = (*best.added, *other.added)
-        numbers = np.concatenate([j.fit.point.values[len(space.fit.point.values) :] for j in (best, other)])
+    for pair in pairs.values():
+        added = tuple(attached for j in pair for attached in j.added)
+        numbers = np.concatenate([j.fit.point.values[len(space.fit.point.values) :] for j in pair])
         lengths = widths([q for attached in added for q in attached.effect.quantities])
         wide = [np.where(lengths > 0, np.maximum(lengths, width * numbers), numbers) for width in WIDTHS]
         starts += [(added, start) for start in (wide if lengths.any() else wide[:1])]

@@ -72,3 +72,20 @@ def test_bounds_hold_where_a_direction_would_leave_them() -> None:
     linear = linearise(given, start(given, there), np.arange(2), np.full(2, 1e-3))
     along_valleys(replace(given, predict=predict), start(given, there), linear, np.arange(2), robust=4.0)
     assert np.concatenate(asked).max() <= 10.0
+
+
+def test_a_direction_is_asked_again_only_where_the_first_step_was_too_short() -> None:
+    asked: list[Floats] = []
+    given = damped(0.02)
+    point, both = start(given, np.array([0.8, 0.2])), np.arange(2)
+
+    def predict(values: Floats, inputs: Floats, times: Floats) -> Floats:
+        asked.append(values)
+        return given.predict(values, inputs, times)
+
+    counted = replace(given, predict=predict)
+    rough = linearise(given, point, both, np.full(2, 1e-3))
+    once = along_valleys(counted, point, rough, both, robust=4.0)
+    assert len(asked) == 2, "roughness had passed for information"
+    along_valleys(counted, point, once, both, robust=4.0)
+    assert len(asked) == 3
