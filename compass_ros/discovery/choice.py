@@ -69,6 +69,10 @@ class Choice:
         """Excess of chi-square that a model leaves."""
         return 2 * max(joint.fit.point.cost - self.floor, 0.0) / joint.likelihood.measurements
 
+    def ends(self, joint: Joint, unseen: HeldOut) -> bool:
+        """Whether an effect reaches the noise floor: no other is to be looked for beside it."""
+        return self.remainder(joint) < SEEN and unseen.remainder(joint) < SMALL
+
     def explains(self, pair: Joint, first: Joint) -> bool:
         """Whether what one effect leaves has a second cause.
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from compass_ros.discovery.anew import contacts_anew
 from compass_ros.discovery.beginning import in_place_of
 from compass_ros.discovery.candidates import Candidate, scattered
-from compass_ros.discovery.choice import LEADERS, PREDICTS, SEEN, Choice, comes_to, evidence, undecided
+from compass_ros.discovery.choice import FORM_LEFT, LEADERS, PREDICTS, SEEN, Choice, comes_to, evidence, undecided
 from compass_ros.discovery.joint import Joint, converge, finished, from_second_start
 from compass_ros.discovery.pairs import (
     of_singles,
@@ -102,17 +102,22 @@ def _tried(choice: Choice, more: Iterable[list[Joint]], unseen: HeldOut) -> Choi
 def _with_scatter(choice: Choice, space: Space, candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
     """The same with what differs from episode to episode by chance, where that explains what no law does.
 
-    It has no functional form that could be wrong: it explains all or is not there. Asked last, for a number for each
-    episode would stand for two laws as well. No pair is made of it.
+    It has no functional form that could be wrong: it explains all, with a law beside it perhaps, or is not there.
+    Asked last, for a number for each episode would stand for two laws as well.
     """
+    slight = SLIGHT * choice.excess
     for candidate in scattered(space.simulator):
-        joint = fit_scattered(space, candidate, SLIGHT * choice.excess)
+        joint = fit_scattered(space, candidate, slight)
         if choice.of([joint]).share(joint) < LEADS or follows_command(joint):
             continue
         joint = settled_scatter(joint)
         judged = choice.of([joint, *choice.singles])
         if judged.share(joint) > WHOLLY and judged.nameable(joint, unseen):
             return _concluded(judged, space, candidates, unseen)
+        for pair in promising_pairs([joint], candidates, slight)[:1]:
+            shown = replace(judged.shown_by(pair), pair=pair)
+            if shown.share(pair) > WHOLLY and shown.verdict(unseen) is pair:
+                return shown
     return choice
 
 
@@ -171,11 +176,27 @@ def _concluded(choice: Choice, space: Space, candidates: Sequence[Candidate], un
     first = simplest(choice.good(unseen))
     choice = choice.of(sorted([*choice.singles, *_in_its_place(first, choice, space, candidates)], key=worth))
     first = simplest(choice.good(unseen))
+    if not choice.ends(first, unseen):
+        choice = _contested(choice, unseen)
+        first = simplest(choice.good(unseen))
     equal = _equals(first, choice, unseen)
     others = [j for j in choice.singles if j is not first]
-    at_floor = choice.remainder(first) < SEEN
-    choice = choice.of([finished(first) if at_floor else from_second_start(first), *others])
+    end = finished if choice.ends(first, unseen) else from_second_start
+    choice = choice.of([end(first), *others])
     return _with_second(replace(choice, equal=equal), candidates, unseen)
+
+
+def _contested(choice: Choice, unseen: HeldOut) -> Choice:
+    """The same with all effects that may be named at their optimum, where none of them reaches the noise floor.
+
+    Along a valley a step gains little long before the end, and the right effect may be behind a wrong one there.
+    """
+    good = different(choice.good(unseen))
+    if len(good) < 2:
+        return choice
+    ended = [finished(j) for j in good]
+    contested = choice.of(sorted([*ended, *(j for j in choice.singles if j not in good)], key=worth))
+    return contested if contested.good(unseen) else choice
 
 
 def _in_its_place(first: Joint, choice: Choice, space: Space, candidates: Sequence[Candidate]) -> list[Joint]:
@@ -234,7 +255,7 @@ def simplest(good: Sequence[Joint]) -> Joint:
 def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOut) -> Choice:
     """The same with a second effect where the first leaves something, and that has a cause of its own."""
     first = choice.singles[0]
-    if choice.remainder(first) < SEEN:
+    if choice.ends(first, unseen):
         return choice
     slight = SLIGHT * choice.excess
     pairs = promising_pairs([first], candidates, slight)
@@ -254,5 +275,6 @@ def _beside(first: Joint, pairs: Sequence[Joint], choice: Choice, unseen: HeldOu
     """The same with the best of some pairs with the first effect, and whether there are two."""
     pair = max(pairs, key=lambda p: evidence(p, unseen))
     choice = replace(choice.shown_by(pair), pair=pair)
-    needed, predicts = choice.remainder(first) > SEEN, unseen.beside(first).helps(pair)
+    predicts = unseen.beside(first).helps(pair)
+    needed = choice.remainder(first) > SEEN or unseen.remainder(pair) < FORM_LEFT * unseen.remainder(first)
     return replace(choice, two=predicts and needed and choice.explains(pair, first))

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compass_ros.calibration.least_squares import minimise
+from compass_ros.calibration.least_squares import cost, minimise
 from compass_ros.calibration.refine import refine
 from compass_ros.discovery import choose
 from compass_ros.discovery.beginning import begun, in_place_of
 from compass_ros.discovery.candidates import Candidate, candidates
 from compass_ros.discovery.choice import undecided
-from compass_ros.discovery.choose import _in_its_place, _with_second
+from compass_ros.discovery.choose import _contested, _in_its_place, _with_second
 from compass_ros.discovery.joint import fit_jointly
 from compass_ros.discovery.pairs import of_singles, one_of, with_contacts
 from compass_ros.discovery.screen import Score
@@ -98,6 +98,26 @@ def test_an_effect_that_was_tried_first_does_not_hide_its_twin() -> None:
     behind = replace(twin, fit=replace(twin.fit, point=replace(twin.fit.point, cost=twin.fit.point.cost + 10.0)))
     (again,) = _in_its_place(first, choice.of([first, behind]), space, asked)
     assert again.fit.point.cost == pytest.approx(twin.fit.point.cost, abs=1.0), "it had not converged"
+
+
+def test_effects_that_may_be_named_are_compared_at_their_optimum() -> None:
+    """The latency is planted, and a step short of its place the fit of its twin is the better one."""
+    latency, delay = (Attached(EFFECTS[name], ()) for name in ("camera_latency", "actuation_delay"))
+    space = space_of(recorded(latency, [0.046]))
+    unseen = held_out(recorded(latency, [0.046], HELD_OUT, 1), space.likelihood, space.fit)
+    twin = in_place_of(joint(space, latency, [0.046]), delay, simulator(), space.likelihood)
+    behind = joint(space, latency, [0.043])
+    reached = cost(behind.likelihood, [behind.fit.point], behind.fit.robust)[0][0]
+    behind = replace(behind, fit=replace(behind.fit, point=replace(behind.fit.point, cost=float(reached))))
+    choice = undecided(space).of([twin, behind])
+    assert choice.good(unseen) == [twin, behind]
+    ended = _contested(choice, unseen)
+    assert all(j.settled for j in ended.singles)
+    (found,) = (j for j in ended.singles if j.added == (latency,))
+    assert found.fit.point.cost < behind.fit.point.cost - 3.0
+    assert found.fit.point.values[-1] == pytest.approx(0.046, abs=0.001)
+    alone = undecided(space).of([twin])
+    assert _contested(alone, unseen) is alone, "nothing contests it"
 
 
 @pytest.mark.slow
