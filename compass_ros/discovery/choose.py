@@ -241,7 +241,10 @@ def _equals(best: Joint, choice: Choice, unseen: HeldOut) -> tuple[Joint, ...]:
     equal = [
         joint
         for joint in different(choice.singles)
-        if joint.name != best.name and top - evidence(joint, unseen) < margin and unseen.helps(joint)
+        if joint.name != best.name
+        and top - evidence(joint, unseen) < margin
+        and unseen.helps(joint)
+        and not joint.stands_in
     ]
     names = {best.name, *(joint.name for joint in equal)}
     return tuple(joint for joint in equal if joint.added[0].effect.limit not in names)

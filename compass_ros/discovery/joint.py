@@ -51,10 +51,14 @@ class Joint:
 
     @property
     def stands_in(self) -> bool:
-        """Whether a field is as narrow as its range allows: it stands for something that is no field."""
+        """Whether a shape is not what the effect's name says: it stands for something else.
+
+        A field as narrow as its range allows is none, a patch as wide as the table has one edge.
+        """
         numbers = self.fit.point.values[len(self.simulator.cell.parameters) :]
-        least = widths([q for attached in self.simulator.effects for q in attached.effect.quantities])
-        return bool(np.any((least > 0) & (numbers <= least)))
+        quantities = [q for attached in self.simulator.effects for q in attached.effect.quantities]
+        least, most = widths(quantities), np.array([q.most for q in quantities])
+        return bool(np.any(((least > 0) & (numbers <= least)) | (numbers >= most)))
 
     def log_evidence(self, correlation_time: float) -> float:
         """Laplace approximation in the prior's units, the data's part divided by the correlation time."""

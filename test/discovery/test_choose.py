@@ -42,11 +42,22 @@ def test_one_of_a_pair_that_does_nothing_can_be_left_out_and_the_other_cannot(sw
     assert swirl.fit.point.values[-5:-1] == pytest.approx(PLANTED[:4], rel=0.1)
 
 
-@pytest.mark.parametrize(("radius", "stands_in"), [(0.03, True), (0.05, False)])
-def test_a_field_as_narrow_as_its_range_allows_stands_for_something_else(radius: float, stands_in: bool) -> None:
-    fan = Attached(EFFECTS["fan_field"], PUCKS)
-    assert joint(planned_space(), fan, [0.02, -0.1, 0.0, radius, 0.5]).stands_in == stands_in
-    assert not joint(planned_space(), TILT, [1e-3, 0.0]).stands_in
+@pytest.mark.parametrize(
+    ("name", "numbers", "stands_in"),
+    [
+        ("fan_field", [0.02, -0.1, 0.0, 0.03, 0.5], True),
+        ("fan_field", [0.02, -0.1, 0.0, 0.05, 0.5], False),
+        ("friction_patch", [0.02, -0.1, 0.0, 0.25], True),
+        ("friction_patch", [0.02, -0.1, 0.0, 0.15], False),
+        ("stribeck_friction", [0.02, 0.35], True),
+        ("stribeck_friction", [0.02, 0.2], False),
+        ("table_tilt", [1e-3, 0.0], False),
+    ],
+)
+def test_a_shape_that_is_not_what_the_name_says_stands_for_something_else(
+    name: str, numbers: list[float], stands_in: bool
+) -> None:
+    assert joint(planned_space(), Attached(EFFECTS[name], PUCKS), numbers).stands_in == stands_in
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -31,6 +32,9 @@ class Quantity:
     """False for shapes (a centre, a radius, a frequency), which mean nothing while the amplitudes are zero."""
     start: float = 0.0
     """Where a search begins; for shapes."""
+    most: float = math.inf
+    """From here on an effect is no longer what its name says (a patch as wide as the table), and is not named; for
+    shapes."""
 
 
 @dataclass(frozen=True)

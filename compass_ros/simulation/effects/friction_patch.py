@@ -2,7 +2,8 @@
 
 F = -extra N v / |v| / (1 + exp(10 (r / radius - 1))), r from the centre, so inside `radius` with a soft edge; N is the
 load on the table.
-Source: Coulomb friction with a coefficient that depends on the place.
+Source: Coulomb friction with a coefficient that depends on the place. Of a patch with a radius over 0.2 m only an edge
+is on a table of 0.45 m: friction changes at a line then, or along the table.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ EFFECT = Effect(
         Quantity("extra", "1", -0.15, 0.6, 0.02),
         Quantity("centre_x", "m", -0.45, 0.45, 0.05, amplitude=False, start=0.0),
         Quantity("centre_y", "m", -0.225, 0.225, 0.05, amplitude=False, start=0.0),
-        Quantity("radius", "m", 0.03, 0.3, 0.03, amplitude=False, start=0.1),
+        Quantity("radius", "m", 0.03, 0.3, 0.03, amplitude=False, start=0.1, most=0.2),
     ),
     sentence="a patch with other friction",
     forces=_forces,

@@ -1,7 +1,8 @@
 """Friction that is higher when slow.
 
 F = -extra exp(-(v / speed)^2) N v / |v| on top of the ordinary friction; on a joint `extra` is a torque [N m].
-Source: Stribeck curve in the form of Armstrong-Helouvry 1994, Gaussian exponent 2.
+Source: Stribeck curve in the form of Armstrong-Helouvry 1994, Gaussian exponent 2. The speeds of contacts are below
+0.1 m/s there; with more than 0.3 m/s it is no friction of low speeds: a drag that falls at speed looks like that.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ EFFECT = Effect(
     channel="dynamics",
     quantities=(
         Quantity("extra", "1", 0.0, 0.5, 0.02),
-        Quantity("speed", "m/s", 0.01, 1.0, 0.05, amplitude=False, start=0.1),
+        Quantity("speed", "m/s", 0.01, 1.0, 0.05, amplitude=False, start=0.1, most=0.3),
     ),
     sentence="higher friction at low speed (Stribeck)",
     forces=_forces,
