@@ -44,7 +44,7 @@ def _wrong(among: Sequence[Line]) -> str:
     for line in among:
         marks = line.get("marks")
         if not marks:
-            said[" + ".join(line.get("truth", ())) or "?", str(line["error"])] += 1
+            said[" + ".join(line.get("truth", ())) or "not played", str(line["error"])] += 1
         elif not marks["right"]:
             names = ", ".join(marks["found"])
             said[" + ".join(marks["truth"]) or "nothing", marks["verdict"] + (f": {names}" if names else "")] += 1

@@ -124,7 +124,7 @@ def _proportion(what: str, outcomes: Sequence[bool], bar: float, most: bool = Fa
     hits, count = int(np.sum(outcomes)), len(outcomes)
     share = hits / count
     reached = share <= bar if most else share >= bar
-    return Row(what, text, f"{100 * share:.0f} %", wilson(outcomes), f"{hits} of {count}", reached)
+    return Row(what, text, f"{100 * share:.3g} %", wilson(outcomes), f"{hits} of {count}", reached)
 
 
 def _between(what: str, outcomes: Sequence[bool], low: float, high: float) -> Row:
