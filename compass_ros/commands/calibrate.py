@@ -18,7 +18,7 @@ from typing import Annotated
 import typer
 
 from compass_ros.commands.progress import Bar
-from compass_ros.types import Progress, Result
+from compass_ros.types import Progress
 
 
 class ProgressStyle(str, Enum):
@@ -55,9 +55,11 @@ def calibrate(
     config: Annotated[Path | None, typer.Option(help="YAML with any field of the configuration")] = None,
     discover: Annotated[bool, typer.Option(help="look for missing physics after the calibration")] = True,
     progress: Annotated[ProgressStyle, typer.Option(help="how to show progress")] = ProgressStyle.bar,
+    repeat: Annotated[str, typer.Option(hidden=True, help="the command that the report gives; empty: this one")] = "",
 ) -> None:
     """Find which simulator parameters are wrong, what they should be, and what physics is missing."""
-    run(bags, cell, out, settings(method, seed, rollouts, held_out, episodes, discover, config, parameters), progress)
+    given = settings(method, seed, rollouts, held_out, episodes, discover, config, parameters)
+    run(bags, cell, out, given, progress, repeat or shlex.join(["compass", *sys.argv[1:]]))
 
 
 def settings(
@@ -91,9 +93,9 @@ def run(
     out: Path,
     config: Mapping[str, object],
     style: ProgressStyle,
-    truth: Mapping[str, float] | None = None,
-) -> Result:
-    """Calibrate, write everything into `out`, print the tables."""
+    repeat: str,
+) -> None:
+    """Calibrate, write everything into `out`, print the tables; `repeat` is the command line that the report gives."""
     from compass_ros.cells import load
     from compass_ros.config import calibration_config
     from compass_ros.episodes import read_episodes
@@ -113,13 +115,12 @@ def run(
     said = (*doubts(cell, episodes), *result.warnings)
     budget = replace(result.budget, wall_seconds=time.monotonic() - started)
     result = replace(result, budget=budget, warnings=said)
-    write_all(result, found, cell, out, shlex.join(["compass", *sys.argv[1:]]), truth or {})
+    write_all(result, found, cell, out, repeat)
     if style is ProgressStyle.bar:
-        print_result(result, truth)
+        print_result(result)
         for warning in said:
             typer.echo(f"note: {warning}", err=True)
         print(f"report: {os.path.relpath(out / 'report.html')}")
-    return result
 
 
 def _shown(style: ProgressStyle) -> AbstractContextManager[Bar | _JsonLines | _Quiet]:

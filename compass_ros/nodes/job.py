@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shlex
 import shutil
 import signal
 import subprocess
@@ -81,12 +82,13 @@ class Step:
 
 
 def command(request: Request, folder: Path) -> list[str]:
-    """The command line that does the work and leaves its result in `folder`."""
-    words = [sys.executable, "-m", "compass_ros.cli", "calibrate", "--cell", request.cell, "--out", str(folder)]
-    words += ["--method", request.method, "--seed", str(request.seed), "--progress", "json"]
+    """The command line that does the work and leaves its result in `folder`; the report gives the one to type."""
+    words = ["--cell", request.cell, "--method", request.method, "--seed", str(request.seed)]
     if request.rollouts:
         words += ["--rollouts", str(request.rollouts)]
-    return [*words, "--", *request.bags]
+    typed = shlex.join(["compass", "calibrate", *words, "--out", str(request.output), "--", *request.bags])
+    start = [sys.executable, "-m", "compass_ros.cli", "calibrate", "--progress", "json", "--repeat", typed]
+    return [*start, *words, "--out", str(folder), "--", *request.bags]
 
 
 def prepare(output: Path) -> Path:

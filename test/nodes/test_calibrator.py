@@ -15,6 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.srv import DescribeParameters, ListParameters
 from std_srvs.srv import Trigger
 
+from compass_ros.reporting.kept import read_all
 from test.nodes.conftest import StartNode
 from test.nodes.harness import LATCHED, RELIABLE, Probe, until
 from test.nodes.recordings import record
@@ -80,6 +81,8 @@ def test_a_start_with_bags_publishes_what_result_json_says(
     nominal = next(gap for gap in mismatch.gaps if (gap.model, gap.episodes) == ("nominal", "fit"))
     assert dict(zip(nominal.factors, nominal.d, strict=True)) == result["gap"]["nominal"]["fit"]["d"]
     assert names(tmp_path / "out") == ["result"]
+    typed = f"compass calibrate --cell air_hockey --method default --seed 1 --rollouts 600 --out {output} -- {bags}"
+    assert read_all(output)[1].command == typed
 
     said = probe.wait_for(
         diagnostics,

@@ -121,9 +121,11 @@ def test_progress_has_the_time_that_is_left() -> None:
     assert math.isnan(read_step(json.dumps(LINE | {"done": 0}).encode(), 30.0).seconds_left)
 
 
-def test_command_hands_on_everything() -> None:
-    request = Request(bags=("a", "b"), cell="air_hockey", seed=3, rollouts=0, output=Path("out"), method="compass")
-    words = ["--cell", "air_hockey", "--out", "tmp", "--method", "compass", "--seed", "3", "--progress", "json"]
-    assert command(request, Path("tmp"))[3:] == ["calibrate", *words, "--", "a", "b"]
+def test_command_hands_on_everything_and_the_report_gives_what_a_user_types() -> None:
+    request = Request(bags=("a", "b c"), cell="air_hockey", seed=3, rollouts=0, output=Path("out"), method="compass")
+    words = ["--cell", "air_hockey", "--method", "compass", "--seed", "3", "--out"]
+    typed = "compass calibrate --cell air_hockey --method compass --seed 3 --out out -- a 'b c'"
+    start = ["calibrate", "--progress", "json", "--repeat", typed]
+    assert command(request, Path("tmp"))[3:] == [*start, *words, "tmp", "--", "a", "b c"]
     budget = Request(bags=("a",), cell="x.yaml", seed=0, rollouts=500, output=Path("out"))
-    assert command(budget, Path("tmp"))[-4:] == ["--rollouts", "500", "--", "a"]
+    assert command(budget, Path("tmp"))[-6:] == ["--rollouts", "500", "--out", "tmp", "--", "a"]
