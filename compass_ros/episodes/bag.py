@@ -121,6 +121,8 @@ def _scan_folder(folder: Path) -> Iterator[RawTopic | RawMessage]:
 
 def _scan_mcap(path: Path) -> Iterator[RawTopic | RawMessage]:
     try:
+        if not mcap_stream.begins(path):
+            raise BagError(f"{path}: expected MCAP, found a file that does not begin as one")
         if not mcap_stream.is_whole(path):
             folder = path.parent if (path.parent / metadata.FILE_NAME).exists() else path
             raise BagError(f"{path}: truncated, the file has no end; run: compass record --recover {folder}")

@@ -60,6 +60,12 @@ def test_empty_file(bag: Path) -> None:
     assert "truncated" in complaint(bag)
 
 
+@pytest.mark.parametrize("content", [b"hello", b"\x89PNG\r\n\x1a\n" + bytes(99)])
+def test_a_file_that_is_no_mcap_is_not_called_cut_off(bag: Path, content: bytes) -> None:
+    mcap_file(bag).write_bytes(content)
+    assert complaint(bag).endswith("shot_0.mcap: expected MCAP, found a file that does not begin as one")
+
+
 def test_without_metadata_it_says_how_to_recover(bag: Path) -> None:
     (bag / "metadata.yaml").unlink()
     assert f"run: compass record --recover {bag}" in complaint(bag)
