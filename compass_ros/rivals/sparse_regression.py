@@ -106,11 +106,12 @@ def _of_window(given: Calibrated, window_s: float) -> list[Model]:
         samples = everything.of(np.isin(everything.mover, chosen))
         if len(samples.time) < LEAST_SAMPLES:
             continue
-        off, blocks = _library(given, samples)
+        objects = tuple(given.movers[i] for i in chosen)
+        slid, off, blocks = _library(given, samples)
         for name, coefficients in _selections(off, blocks, samples.acceleration.ravel()):
             joined = np.hstack([b.columns for b in blocks])
             friction, *_ = np.linalg.lstsq(off, samples.acceleration.ravel() - joined @ coefficients, rcond=None)
-            effects = _effects(given, chosen, blocks, coefficients, friction)
+            effects = _effects(objects, blocks, coefficients, dict(zip(slid, friction, strict=True)))
             key = (chosen, tuple(np.round(coefficients, 9)))
             if key not in out and any(a.effect.name != NUISANCE for a, _ in effects):
                 out[key] = Model(window_s, name, effects, _held_out(given, effects))
@@ -133,30 +134,28 @@ def _selections(off: Floats, blocks: Sequence[Block], target: Floats) -> Iterato
         at = own.stop
 
 
-def _library(given: Calibrated, samples: Samples) -> tuple[Floats, list[Block]]:
-    """Columns of friction of the bodies that there are samples of, and a block for each named effect."""
-    friction = nuisance(given.simulator, given.values, given.movers, samples)
-    friction = friction[:, np.unique(samples.mover)]
+def _library(given: Calibrated, samples: Samples) -> tuple[tuple[str, ...], Floats, list[Block]]:
+    """The bodies that there are samples of, a column of friction for each, and a block for each named effect."""
+    slid = np.unique(samples.mover)
+    friction = nuisance(given.simulator, given.values, given.movers, samples)[:, slid]
     base, _ = np.linalg.qr(friction)
     effects = named_effects(given.simulator, given.movers)
-    return friction, [best_block(given.simulator, given.values, given.movers, samples, e, base) for e in effects]
+    blocks = [best_block(given.simulator, given.values, given.movers, samples, e, base) for e in effects]
+    return tuple(given.movers[i] for i in slid), friction, blocks
 
 
 def _effects(
-    given: Calibrated, chosen: Sequence[int], blocks: Sequence[Block], coefficients: Floats, friction: Floats
+    objects: tuple[str, ...], blocks: Sequence[Block], coefficients: Floats, friction: Mapping[str, float]
 ) -> tuple[tuple[Attached, Floats], ...]:
     """What survived, within the bounds of its quantities: a drag that drives is no drag."""
     out, at = [], 0
-    objects = tuple(given.movers[i] for i in chosen)
     for block in blocks:
         own = coefficients[at : at + len(block.units)]
         at += len(block.units)
         attached, numbers = Attached(block.effect, objects), block.numbers(own)
         if own.any() and attached.present(numbers[None]):
             out.append((attached, numbers))
-    out += [
-        (Attached(EFFECTS[NUISANCE], (name,)), np.array([extra])) for name, extra in zip(objects, friction, strict=True)
-    ]
+    out += [(Attached(EFFECTS[NUISANCE], (name,)), np.array([extra])) for name, extra in friction.items()]
     return tuple(out)
 
 

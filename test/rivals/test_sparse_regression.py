@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -25,6 +27,16 @@ def test_a_planted_force_is_named(name: str, numbers: list[float]) -> None:
     found = next(values for attached, values in model.effects if attached.effect.name == name)
     np.testing.assert_allclose(found, numbers, rtol=0.15)
     assert model.held_out_m < 0.1 * rms(given.held_out.predicted, given.held_out.data.measured)
+
+
+def test_a_body_that_never_slid_freely_is_no_obstacle() -> None:
+    given = played([("viscous_drag", ("puck1",), [0.1])], sigma=2e-5)
+    measured = given.fit.data.measured.copy()
+    measured[:, :, 2:] = np.nan  # puck2
+    unseen = replace(given.fit, data=replace(given.fit.data, measured=measured))
+    model = sparse_regression(replace(given, fit=unseen), windows_s=(0.2,))
+    assert model is not None
+    assert model.names == ("viscous_drag",)
 
 
 def test_noise_is_not_named() -> None:
