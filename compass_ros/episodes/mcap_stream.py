@@ -13,12 +13,10 @@ import zstandard
 from mcap.exceptions import EndOfFile, McapError, UnsupportedCompressionError
 from mcap.records import Channel, Chunk, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
+from mcap.writer import MCAP0_MAGIC
 
 LARGEST_CHUNK = 256 * 2**20
 """A record that is longer than this, or a chunk that unpacks to more, is refused [bytes]."""
-
-MAGIC = b"\x89MCAP0\r\n"
-"""What an MCAP file begins and ends with (the format's specification, "Magic")."""
 
 BROKEN = (McapError, ValueError, RuntimeError, EOFError, OverflowError, zstandard.ZstdError)
 """What a damaged file raises: mcap's own errors, bad text or checksums (ValueError), lz4 (RuntimeError), zstd."""
@@ -62,7 +60,7 @@ def records(path: Path) -> Iterator[Schema | Channel | Message | Metadata]:
 def begins(path: Path) -> bool:
     """Whether the file begins as an MCAP file does; one that is cut off in its first bytes, or empty, may have."""
     with path.open("rb") as file:
-        return MAGIC.startswith(file.read(len(MAGIC)))
+        return MCAP0_MAGIC.startswith(file.read(len(MCAP0_MAGIC)))
 
 
 def is_whole(path: Path) -> bool:
@@ -70,7 +68,7 @@ def is_whole(path: Path) -> bool:
     with path.open("rb") as file:
         start = file.read(8)
         file.seek(max(path.stat().st_size - 8, 0))
-        return file.read(8) == start == MAGIC and path.stat().st_size > 16
+        return file.read(8) == start == MCAP0_MAGIC and path.stat().st_size > 16
 
 
 def _inside(chunk: Chunk) -> Iterator[Schema | Channel | Message]:
