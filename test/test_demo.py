@@ -108,7 +108,7 @@ def test_the_main_job(tmp_path: Path, started: list[Demo]) -> None:
 
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
 def test_what_is_stopped_leaves_nothing_running(by: signal.Signals, tmp_path: Path, started: list[Demo]) -> None:
-    demo = Demo(tmp_path)
+    demo = Demo(tmp_path, "--effect", "none")
     started.append(demo)
     until(lambda: demo.look() or len(list((demo.out / "bags").glob("*"))) > 1, "the first episode")
     demo.look()
