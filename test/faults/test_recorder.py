@@ -53,11 +53,15 @@ def test_lost_messages_are_said(start_node: StartNode, probe: Probe, tmp_path: P
         publish(pose(number))
     node.process.send_signal(signal.SIGCONT)
     publish(pose(101))
-    probe.wait_for(statuses, lambda status: "lost" in status.message)
+
+    def said(info: EpisodeInfo) -> str:
+        """What has to be said when all 102 have come or are lost; the first of `messages` tells of the cell."""
+        return f"lost {102 - (info.messages - 1)} messages on {TOPIC}"
+
+    status = probe.wait_for(statuses, lambda status: status.message == said(status))
     stopped = probe.call(StopEpisode, "/recorder/stop_episode")
-    lost = 102 - (stopped.info.messages - 1)
-    assert lost > 0
-    assert stopped.message == f"lost {lost} messages on {TOPIC}"
+    assert 2 < stopped.info.messages < 103
+    assert stopped.message == status.message == said(stopped.info)
 
 
 def test_an_episode_that_nobody_stops(start_node: StartNode, probe: Probe, tmp_path: Path) -> None:
