@@ -45,6 +45,9 @@ const drawTable = () => {
   });
 };
 
+// Thousandths of the unit; far below the noise nothing is worth a look, and a logarithm needs an end.
+const LOWEST = 0.02;
+
 const drawErrors = () => {
   const tracks = data.episodes[episode].tracks, rows = tracks.length, narrow = errorPlot.clientWidth < 480;
   const traces = [], shapes = [], annotations = [], axes = {};
@@ -52,13 +55,13 @@ const drawErrors = () => {
   tracks.forEach((track, i) => {
     const n = i ? i + 1 : "", gap = 0.09 / rows;
     axes[`yaxis${n}`] = axis({
-      type: "log", range: [-1, Math.log10(top) + 0.15], domain: [1 - (i + 1) / rows + (i < rows - 1 ? gap : 0), 1 - i / rows - gap],
+      type: "log", range: [Math.log10(LOWEST), Math.log10(top) + 0.15], domain: [1 - (i + 1) / rows + (i < rows - 1 ? gap : 0), 1 - i / rows - gap],
       title: label(data.unit), tickvals: [0.1, 1, 10, 100, 1000], ticktext: ["0.1", "1", "10", "100", "1000"],
     });
     for (const model of data.models.filter((m) => shown[m.key] && track.error_mm[m.key])) {
       const style = STYLE[model.key];
       traces.push({
-        x: track.time, y: track.error_mm[model.key].map((e) => (e === null ? null : Math.max(e, 0.05))), yaxis: `y${n}`, type: "scatter", mode: "lines", name: model.label,
+        x: track.time, y: track.error_mm[model.key].map((e) => (e === null ? null : Math.max(e, LOWEST))), yaxis: `y${n}`, type: "scatter", mode: "lines", name: model.label,
         line: { color: colour(model.key), width: style.width - 0.3, dash: style.dash }, hovertemplate: `%{y:.2f} ${data.unit} ${model.label}<extra></extra>`,
       });
     }
