@@ -76,6 +76,7 @@ setup(
         "numpy",
         "opencv-python",
         "openpyxl",
+        "plotly",  # its bundle of JavaScript goes into the report
         "pydantic>=2",
         "pysindy<2",  # 2 wants numpy 2, which mink, and so robosuite, does not take
         "pyyaml",

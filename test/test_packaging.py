@@ -8,7 +8,9 @@ import re
 import subprocess
 import sys
 import sysconfig
+from collections.abc import Iterator
 from importlib.metadata import Distribution, packages_distributions
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -31,8 +33,64 @@ def declared() -> set[str]:
     return {plain(name) for name in installed.requires or ()}
 
 
-def test_every_library_that_is_imported_is_declared_and_the_other_way_round() -> None:
-    firsts = {name.partition(".")[0] for path in MODULES for name in imports(ast.parse(path.read_text("utf-8")))}
+def reached_by_name(tree: ast.AST) -> Iterator[str]:
+    """Modules that are reached without `import`: by a text that a loader is given, or after `-m` in a command line."""
+    loaders = {
+        alias.asname or alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for alias in node.names
+        if (getattr(node, "module", None) or alias.name).partition(".")[0] in ("importlib", "pkgutil", "runpy")
+        or alias.name == "PackageLoader"
+    } | {"__import__"}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and node.args and _root(node.func) in loaders:
+            yield from _text(node.args[0])
+        elif isinstance(node, ast.List | ast.Tuple | ast.Call):
+            words = node.args if isinstance(node, ast.Call) else node.elts
+            for flag, module in pairwise(words):
+                if isinstance(flag, ast.Constant) and flag.value == "-m":
+                    yield from _text(module)
+
+
+def _root(function: ast.expr) -> str:
+    """`resources` of `resources.files`."""
+    while isinstance(function, ast.Attribute):
+        function = function.value
+    return function.id if isinstance(function, ast.Name) else ""
+
+
+def _text(word: ast.expr) -> Iterator[str]:
+    """A name that is written out; of one that is put together, what it begins with."""
+    begun = word.values[0] if isinstance(word, ast.JoinedStr) else word
+    if isinstance(begun, ast.Constant) and isinstance(begun.value, str):
+        yield begun.value
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "from importlib import resources\nresources.files('plotly').joinpath('x')",
+        "import importlib.resources as r\nr.files('plotly')",
+        "from importlib import import_module\ndef f():\n    return import_module('plotly.io')",
+        "import importlib\nimportlib.import_module(f'plotly.{name}')",
+        "__import__('plotly')",
+        "from importlib.util import find_spec\nfound = find_spec('plotly') is not None",
+        "from importlib.metadata import version\nprint(version('plotly'))",
+        "import pkgutil\npkgutil.get_data('plotly', 'package_data/plotly.min.js')",
+        "from runpy import run_module\nrun_module('plotly')",
+        "from jinja2 import PackageLoader\nPackageLoader('plotly')",
+        "import subprocess, sys\nsubprocess.run([sys.executable, '-m', 'plotly'])",
+        "start(name, '-m', f'plotly.{name}')",
+    ],
+)
+def test_a_library_that_is_reached_by_name_is_seen(source: str) -> None:
+    assert {name.partition(".")[0] for name in reached_by_name(ast.parse(source))} == {"plotly"}
+
+
+def test_every_library_that_is_used_is_declared_and_the_other_way_round() -> None:
+    trees = [ast.parse(path.read_text("utf-8")) for path in MODULES]
+    firsts = {name.partition(".")[0] for tree in trees for name in (*imports(tree), *reached_by_name(tree))}
     foreign = firsts - sys.stdlib_module_names - FROM_ROS - {"compass_ros"}
     owners = packages_distributions()
     imported = {plain(owners[name][0]) for name in foreign}
