@@ -4,8 +4,8 @@
     ros2 launch compass_ros cell.launch.py
 
 The camera's topics are named as realsense2_camera names them; the arguments `image` and `camera_info` take others. The
-robot's driver publishes a compass_interfaces/ShotCommand, stamped with the moment the motion begins, on a topic that
-config/recorder.yaml lists. Each node has one YAML of parameters, which an argument can replace. Ctrl-C ends all.
+robot's driver publishes a compass_ros_interfaces/ShotCommand, stamped with the moment the motion begins, on a topic
+that config/recorder.yaml lists. Each node has one YAML of parameters, which an argument can replace. Ctrl-C ends all.
 """
 
 from launch.actions import DeclareLaunchArgument, SetEnvironmentVariable

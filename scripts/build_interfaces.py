@@ -1,4 +1,4 @@
-"""Build the package `compass_interfaces` from the ROS wheels of this environment and install it there.
+"""Build the package `compass_ros_interfaces` from the ROS wheels of this environment and install it there.
 
 Run with the environment's Python. Needs cmake and gcc. The package is compiled as on a robot (ament_cmake, rosidl),
 then packed as a wheel whose libraries land in the environment's `lib/` and `share/`, where the loader and the ament
@@ -8,6 +8,7 @@ index look: the interfaces then need no environment variable. Does nothing when 
 from __future__ import annotations
 
 import hashlib
+import importlib.metadata
 import os
 import shutil
 import subprocess
@@ -20,7 +21,9 @@ from xml.etree import ElementTree
 ROOT = Path(__file__).resolve().parent.parent
 SOURCES = ROOT / "msg_schemas"
 PREFIX = Path(sys.prefix)
-NAME = "compass_interfaces"
+NAME = "compass_ros_interfaces"
+FORMER = "compass_interfaces"
+"""The name in version 0.1. A released ROS package of another project has it."""
 MARK = Path("share") / NAME / "sources.sha256"
 """Installed with the package: which sources it was built from."""
 
@@ -72,7 +75,14 @@ def pack_wheel(stage: Path, tree: Path) -> Path:
     return next(tree.parent.glob("*.whl"))
 
 
+def remove_former() -> None:
+    """Uninstall what version 0.1 of this script installed."""
+    if any(found.name == FORMER for found in importlib.metadata.distributions()):
+        subprocess.run([sys.executable, "-m", "pip", "uninstall", "--quiet", "--yes", FORMER], check=True)
+
+
 def main() -> None:
+    remove_former()
     mark = PREFIX / MARK
     wanted = fingerprint()
     if mark.is_file() and mark.read_text() == wanted:

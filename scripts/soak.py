@@ -27,8 +27,8 @@ from typing import Any
 import numpy as np
 import rclpy
 import yaml
-from compass_interfaces.msg import CalibrationStatus
-from compass_interfaces.srv import StartEpisode, StopEpisode
+from compass_ros_interfaces.msg import CalibrationStatus
+from compass_ros_interfaces.srv import StartEpisode, StopEpisode
 from diagnostic_msgs.msg import DiagnosticArray
 from domain_coordinator import domain_id
 from geometry_msgs.msg import PoseWithCovarianceStamped

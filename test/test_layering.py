@@ -42,7 +42,7 @@ HOMES = {
     ("rosbags", "mcap", "mcap_ros2"): {"episodes"},
     ("rclpy", "launch", "launch_ros", "ament_index_python", "rcl_interfaces", "action_msgs"): {"nodes"},
     ("builtin_interfaces", "std_msgs", "std_srvs", "sensor_msgs", "geometry_msgs"): {"nodes"},
-    ("visualization_msgs", "nav_msgs", "lifecycle_msgs", "diagnostic_msgs", "compass_interfaces"): {"nodes"},
+    ("visualization_msgs", "nav_msgs", "lifecycle_msgs", "diagnostic_msgs", "compass_ros_interfaces"): {"nodes"},
     ("domain_coordinator",): {"nodes", "demo"},
 }
 """Which parts of the package may import these libraries."""

@@ -2,7 +2,7 @@
 
 Two sources. What a recorder writes beside raw bytes is the text that is installed with ROS (`share/PKG/msg`), put
 together as rosbag2 does it. What this package itself serialises needs no ROS: the standard types come with rosbags, and
-the two of `compass_interfaces` that a bag holds are written out below; a test compares them with that package.
+the two of `compass_ros_interfaces` that a bag holds are written out below; a test compares them with that package.
 """
 
 from __future__ import annotations
@@ -20,8 +20,11 @@ from rosbags.typesys.store import Typestore
 
 from compass_ros.errors import BagError
 
-SHOT_TYPE = "compass_interfaces/msg/ShotCommand"
-EPISODE_TYPE = "compass_interfaces/msg/EpisodeInfo"
+SHOT_TYPE = "compass_ros_interfaces/msg/ShotCommand"
+EPISODE_TYPE = "compass_ros_interfaces/msg/EpisodeInfo"
+SHOT_TYPES = frozenset({SHOT_TYPE, "compass_interfaces/msg/ShotCommand"})
+EPISODE_TYPES = frozenset({EPISODE_TYPE, "compass_interfaces/msg/EpisodeInfo"})
+"""As written, and under the name that the interface package had in version 0.1."""
 STRING_TYPE = "std_msgs/msg/String"
 POSE_TYPE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 JOINT_TYPE = "sensor_msgs/msg/JointState"
@@ -72,10 +75,11 @@ class Definition:
 
 @cache
 def typestore() -> Typestore:
-    """ROS 2 Jazzy's standard types and the messages of `compass_interfaces` that a bag holds."""
+    """ROS 2 Jazzy's standard types and the messages of `compass_ros_interfaces` that a bag holds."""
     store = get_typestore(Stores.ROS2_JAZZY)
-    for name, text in COMPASS_MESSAGES.items():
-        store.register(get_types_from_msg(text, name))
+    for current, names in ((SHOT_TYPE, SHOT_TYPES), (EPISODE_TYPE, EPISODE_TYPES)):
+        for name in names:
+            store.register(get_types_from_msg(COMPASS_MESSAGES[current], name))
     return store
 
 

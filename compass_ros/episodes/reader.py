@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from compass_ros.episodes.bag import RawMessage, RawTopic, decode, is_bag, scan
-from compass_ros.episodes.definitions import EPISODE_TYPE, SHOT_TYPE, STRING_TYPE
+from compass_ros.episodes.definitions import EPISODE_TYPES, SHOT_TYPES, STRING_TYPE
 from compass_ros.episodes.notes import NOTES_TOPIC, SHOT_TOPIC, EpisodeHeader, Notes, Shot, header, notes, shot
 from compass_ros.episodes.sources import KNOWN_TYPES, Row, Source, entries, rows
 from compass_ros.errors import BagError, nearest
@@ -125,9 +125,9 @@ class _Content:
         topic = message.topic
         if topic.ros1:
             pass  # our own messages are ROS 2 ones
-        elif topic.type == EPISODE_TYPE:
+        elif topic.type in EPISODE_TYPES:
             self.headers.append(header(decode(message)))
-        elif topic.type == SHOT_TYPE:
+        elif topic.type in SHOT_TYPES:
             self.shots.append((topic.name, shot(decode(message))))
         elif (topic.name, topic.type) == (NOTES_TOPIC, STRING_TYPE):
             self.notes = notes(decode(message))
@@ -235,7 +235,7 @@ def _count(counts: dict[RawTopic, int], item: RawTopic | RawMessage) -> None:
 
 
 def _summaries(counts: Mapping[RawTopic, int]) -> tuple[TopicSummary, ...]:
-    known = KNOWN_TYPES | {EPISODE_TYPE, SHOT_TYPE}
+    known = KNOWN_TYPES | EPISODE_TYPES | SHOT_TYPES
     return tuple(
         TopicSummary(topic.name, topic.type, count, topic.type in known or topic.name == NOTES_TOPIC)
         for topic, count in sorted(counts.items(), key=lambda item: (item[0].name, item[0].type))

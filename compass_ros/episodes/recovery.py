@@ -14,7 +14,7 @@ from mcap.records import Channel, Message, Schema
 
 from compass_ros.episodes import mcap_stream, metadata
 from compass_ros.episodes.bag import RawMessage, RawTopic, decode, scan
-from compass_ros.episodes.definitions import EPISODE_TYPE, Definition, embedded_definition
+from compass_ros.episodes.definitions import EPISODE_TYPE, EPISODE_TYPES, Definition, embedded_definition
 from compass_ros.episodes.notes import EPISODE_TOPIC, EpisodeHeader, header, header_bytes
 from compass_ros.episodes.writer import BagWriter, sync_bag
 from compass_ros.errors import BagError
@@ -134,7 +134,7 @@ def _copy(file: Path, writer: BagWriter) -> EpisodeHeader | None:
             elif isinstance(record, Message) and record.channel_id in channels:
                 channel, topic = channels[record.channel_id]
                 writer.write(channel, record.log_time, record.publish_time, record.data)
-                if topic.type == EPISODE_TYPE:
+                if topic.type in EPISODE_TYPES:
                     with suppress(BagError):  # another version's message: kept as it is
                         last = header(decode(RawMessage(topic, record.log_time, record.data)))
     return last

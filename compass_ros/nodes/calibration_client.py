@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import rclpy
-from compass_interfaces.action import Calibrate
+from compass_ros_interfaces.action import Calibrate
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle

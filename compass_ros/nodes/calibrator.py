@@ -10,8 +10,8 @@ import threading
 import time
 from pathlib import Path
 
-from compass_interfaces.action import Calibrate
-from compass_interfaces.msg import CalibrationStatus, CausalGraph, EpisodeInfo, Mismatch, SimParameters
+from compass_ros_interfaces.action import Calibrate
+from compass_ros_interfaces.msg import CalibrationStatus, CausalGraph, EpisodeInfo, Mismatch, SimParameters
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange
 from rclpy.action import ActionClient, ActionServer, CancelResponse

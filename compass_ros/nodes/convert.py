@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from statistics import fmean
 from typing import Any
 
-from compass_interfaces.msg import (
+from compass_ros_interfaces.msg import (
     CalibrationStatus,
     CausalGraph,
     Effect,

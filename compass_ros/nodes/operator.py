@@ -10,7 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import datetime, timezone
 from pathlib import Path
 
-from compass_interfaces.msg import SimParameter, SimParameters
+from compass_ros_interfaces.msg import SimParameter, SimParameters
 from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import OccupancyGrid
 from rclpy.node import Node

@@ -5,8 +5,8 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from compass_interfaces.msg import EpisodeInfo
-from compass_interfaces.srv import StartEpisode, StopEpisode
+from compass_ros_interfaces.msg import EpisodeInfo
+from compass_ros_interfaces.srv import StartEpisode, StopEpisode
 from diagnostic_msgs.msg import DiagnosticArray
 from std_srvs.srv import Trigger
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from builtin_interfaces.msg import Duration, Time
-from compass_interfaces.msg import EpisodeInfo
+from compass_ros_interfaces.msg import EpisodeInfo
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from compass_ros.episodes.notes import STATES, EpisodeHeader

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from compass_interfaces.action import Calibrate
-from compass_interfaces.srv import StartEpisode
+from compass_ros_interfaces.action import Calibrate
+from compass_ros_interfaces.srv import StartEpisode
 
 from compass_ros.errors import BagError, ConfigError
 

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
-from compass_interfaces.msg import ShotCommand
-from compass_interfaces.srv import StartEpisode, StopEpisode
+from compass_ros_interfaces.msg import ShotCommand
+from compass_ros_interfaces.srv import StartEpisode, StopEpisode
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.client import Client

@@ -15,7 +15,7 @@ import json
 from pathlib import Path
 
 import numpy as np
-from compass_interfaces.msg import ShotCommand
+from compass_ros_interfaces.msg import ShotCommand
 from numpy.typing import NDArray
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node

@@ -12,7 +12,15 @@ import yaml
 
 from compass_ros.episodes import Source, list_topics, read_bag, read_episode, read_episodes, write_episode
 from compass_ros.episodes.bag import RawMessage, decode
-from compass_ros.episodes.definitions import EPISODE_TYPE, SHOT_TYPE, STRING_TYPE, embedded_definition, typestore
+from compass_ros.episodes.definitions import (
+    EPISODE_TYPE,
+    EPISODE_TYPES,
+    SHOT_TYPE,
+    SHOT_TYPES,
+    STRING_TYPE,
+    embedded_definition,
+    typestore,
+)
 from compass_ros.episodes.notes import NOTES_TOPIC, EpisodeHeader, Shot, encoded, header_bytes, shot_bytes
 from compass_ros.episodes.writer import BagWriter
 from compass_ros.errors import BagError
@@ -125,7 +133,7 @@ def test_of_another_cell(bag: Path) -> None:
 
 
 def test_topic_of_another_type(bag: Path) -> None:
-    assert "is a compass_interfaces/msg/ShotCommand; expected" in complaint(
+    assert "is a compass_ros_interfaces/msg/ShotCommand; expected" in complaint(
         bag, (Source("/virtual_cell/shot", "puck1"),)
     )
 
@@ -208,6 +216,17 @@ def test_the_shot_of_an_earlier_episode_is_left_out(tmp_path: Path) -> None:
     assert found.start_ns == START_NS + MS
 
 
+@pytest.mark.parametrize("shot_type", sorted(SHOT_TYPES))
+@pytest.mark.parametrize("head_type", sorted(EPISODE_TYPES))
+def test_bags_of_every_version_say_their_shot_and_their_episode(tmp_path: Path, head_type: str, shot_type: str) -> None:
+    """Version 0.1 called the interface package otherwise."""
+    head = header_bytes(EpisodeHeader("finished", "seventh", "air_hockey", "abc", START_NS))
+    bag = with_messages(tmp_path / "b", ("/e", head_type, head), ("/a/shot", shot_type, fired(START_NS, v=2)))
+    found = read_bag(bag, PUCK1)
+    assert (found.episode.name, found.episode.cell_hash, found.episode.action) == ("seventh", "abc", {"v": 2})
+    assert {topic.type for topic in found.topics if topic.known} >= {head_type, shot_type}
+
+
 def test_the_robots_own_shot_goes_before_the_operators(tmp_path: Path) -> None:
     messages = (
         ("/compass/shot", SHOT_TYPE, fired(START_NS, v=1)),
@@ -241,7 +260,7 @@ def test_other_messages_are_listed(tmp_path: Path) -> None:
 
 def test_bytes_that_are_not_the_type(tmp_path: Path) -> None:
     bag = with_messages(tmp_path / "b", ("/shot", SHOT_TYPE, b"\x00\x01\x00\x00\x05"))
-    assert "a message is not a compass_interfaces/msg/ShotCommand" in complaint(bag, PUCK1)
+    assert "a message is not a compass_ros_interfaces/msg/ShotCommand" in complaint(bag, PUCK1)
 
 
 def test_another_version_of_a_message_is_not_guessed(bag: Path) -> None:

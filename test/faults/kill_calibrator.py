@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from compass_interfaces.msg import CalibrationStatus
+from compass_ros_interfaces.msg import CalibrationStatus
 from domain_coordinator import domain_id
 
 from test.nodes.harness import LATCHED, NodeProcess, Probe, until

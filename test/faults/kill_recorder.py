@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from compass_interfaces.srv import StartEpisode
+from compass_ros_interfaces.srv import StartEpisode
 from domain_coordinator import domain_id
 from geometry_msgs.msg import PoseWithCovarianceStamped
 

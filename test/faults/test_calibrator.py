@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from compass_interfaces.msg import CalibrationStatus
+from compass_ros_interfaces.msg import CalibrationStatus
 
 from test.nodes.conftest import StartNode
 from test.nodes.harness import LATCHED, Probe, until

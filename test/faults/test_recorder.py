@@ -7,8 +7,8 @@ import time
 from pathlib import Path
 
 import pytest
-from compass_interfaces.msg import EpisodeInfo
-from compass_interfaces.srv import StartEpisode, StopEpisode
+from compass_ros_interfaces.msg import EpisodeInfo
+from compass_ros_interfaces.srv import StartEpisode, StopEpisode
 from geometry_msgs.msg import PointStamped, PoseWithCovarianceStamped
 from std_srvs.srv import Trigger
 

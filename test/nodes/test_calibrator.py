@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 from action_msgs.msg import GoalStatus
-from compass_interfaces.action import Calibrate
-from compass_interfaces.msg import CalibrationStatus, CausalGraph, EpisodeInfo, Mismatch, SimParameters
+from compass_ros_interfaces.action import Calibrate
+from compass_ros_interfaces.msg import CalibrationStatus, CausalGraph, EpisodeInfo, Mismatch, SimParameters
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.srv import DescribeParameters, ListParameters
 from std_srvs.srv import Trigger

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from compass_interfaces.msg import CalibrationStatus, EpisodeInfo, Mismatch
+from compass_ros_interfaces.msg import CalibrationStatus, EpisodeInfo, Mismatch
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
@@ -22,9 +22,9 @@ pytestmark = pytest.mark.ros
 LAYOUT = Path(__file__).parents[2] / "config" / "foxglove_layout.json"
 KINDS = {
     "geometry_msgs/msg/PoseWithCovarianceStamped": PoseWithCovarianceStamped,
-    "compass_interfaces/msg/CalibrationStatus": CalibrationStatus,
-    "compass_interfaces/msg/Mismatch": Mismatch,
-    "compass_interfaces/msg/EpisodeInfo": EpisodeInfo,
+    "compass_ros_interfaces/msg/CalibrationStatus": CalibrationStatus,
+    "compass_ros_interfaces/msg/Mismatch": Mismatch,
+    "compass_ros_interfaces/msg/EpisodeInfo": EpisodeInfo,
     "diagnostic_msgs/msg/DiagnosticArray": DiagnosticArray,
     "nav_msgs/msg/OccupancyGrid": OccupancyGrid,
     "sensor_msgs/msg/Image": Image,

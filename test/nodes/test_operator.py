@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 import yaml
-from compass_interfaces.action import Calibrate
-from compass_interfaces.msg import EpisodeInfo, Mismatch, SimParameters
+from compass_ros_interfaces.action import Calibrate
+from compass_ros_interfaces.msg import EpisodeInfo, Mismatch, SimParameters
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import OccupancyGrid
 from std_srvs.srv import Trigger

@@ -6,8 +6,8 @@ import time
 from pathlib import Path
 
 import pytest
-from compass_interfaces.msg import EpisodeInfo, ShotCommand
-from compass_interfaces.srv import StartEpisode, StopEpisode
+from compass_ros_interfaces.msg import EpisodeInfo, ShotCommand
+from compass_ros_interfaces.srv import StartEpisode, StopEpisode
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from mcap.reader import make_reader
