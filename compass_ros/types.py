@@ -65,6 +65,8 @@ class Track:
     """(F, QUANTITY_SIZE[quantity]) in the frame `table`."""
     std: Floats | None = None
     """(F,) one standard deviation of the position [m] (joint: [rad]) as the sensor states it; None: not stated."""
+    frame: str = ""
+    """Frame of the positions as the messages name it; empty: they name none."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,10 @@ class Episode:
     them."""
     source: str = ""
     """Path of the bag."""
+    others: tuple[Track, ...] = ()
+    """The same objects seen in other frames than those of `tracks`: kept apart, and not used."""
+    remarks: tuple[str, ...] = ()
+    """What reading left out or chose, one sentence each."""
 
     def track(self, name: str) -> Track:
         for track in self.tracks:

@@ -25,6 +25,8 @@ class ObjectSpec:
     name: Name
     quantity: Quantity
     topic: Name = ""
+    frame: Name = ""
+    """Frame of its positions in the bags (`header.frame_id`); empty: the one with most messages."""
     body: Name = ""
     """Body (quantity `joint`: joint) of the scene; the object's own name where empty."""
 

@@ -90,9 +90,9 @@ def _header(episode: Episode, topics: tuple[str, ...], messages: Sequence[tuple[
 
 
 def _notes(episode: Episode) -> Notes:
-    """Initial state, and the standard deviations that JointState has no room for."""
+    """Initial state, remarks, and the standard deviations that JointState has no room for."""
     std = {t.object: tuple(t.std.tolist()) for t in episode.tracks if t.quantity == "joint" and t.std is not None}
-    return Notes(episode.initial_state, std)
+    return Notes(episode.initial_state, std, episode.remarks)
 
 
 def _message_type(track: Track) -> str:

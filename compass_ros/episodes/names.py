@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
+import unicodedata
 from collections.abc import Iterable
 
 from compass_ros.errors import BagError
@@ -18,6 +20,22 @@ def episode_name(name: str) -> str:
         shown = name if len(name) <= 100 else name[:100] + "..."
         raise BagError(f"episode name {shown!r}: expected 1 to 100 letters, digits, '_', '-', '.' (no '..', no path)")
     return name
+
+
+def safe_name(text: str) -> str:
+    """An episode name for any text, the same on every machine.
+
+    Spaces and other signs that a name cannot have become `_`. Where letters would be lost (other scripts, a name that
+    is too long or begins with a sign), six digits of the text's hash follow and keep it apart from others: `投げ1` is
+    `1-` with six digits, `1` stays `1`.
+    """
+    composed = unicodedata.normalize("NFC", text)
+    plain = re.sub(r"[^A-Za-z0-9_.-]+", "_", composed)
+    if composed.isascii() and _NAME.fullmatch(plain) and ".." not in plain:
+        return plain
+    letters = unicodedata.normalize("NFKD", composed).encode("ascii", "ignore").decode()
+    readable = re.sub(r"\.\.+|[^A-Za-z0-9_.-]+", "_", letters).strip("_.-")[:80] or "episode"
+    return f"{readable}-{hashlib.sha256(composed.encode(errors='surrogateescape')).hexdigest()[:6]}"
 
 
 def next_name(taken: Iterable[str]) -> str:

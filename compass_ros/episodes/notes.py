@@ -67,6 +67,8 @@ class Notes:
     """First state by object, where the cell does not fix it."""
     std: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     """By object: a standard deviation for each frame, or one for all; where messages cannot state it (JointState)."""
+    remarks: tuple[str, ...] = ()
+    """What the import of a table left out."""
 
 
 class _NotesContent(BaseModel):
@@ -75,6 +77,7 @@ class _NotesContent(BaseModel):
     model_config = ConfigDict(extra="ignore")
     initial_state: dict[str, tuple[FiniteFloat, ...]] = {}
     std: dict[str, Annotated[tuple[FiniteFloat, ...], Field(min_length=1)]] = {}
+    remarks: tuple[str, ...] = ()
 
 
 class _ShotMessage(Protocol):
@@ -136,7 +139,7 @@ def notes(message: object) -> Notes:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         raise BagError(f"{NOTES_TOPIC}: not the notes of an episode: {where}: {first['msg']}") from error
-    return Notes(content.initial_state, content.std)
+    return Notes(content.initial_state, content.std, content.remarks)
 
 
 def stamp_ns(stamp: ros.builtin_interfaces__msg__Time | ros.builtin_interfaces__msg__Duration) -> int:
@@ -181,7 +184,9 @@ def shot_bytes(command: Shot) -> bytes:
 
 def notes_bytes(said: Notes) -> bytes:
     """Notes as std_msgs/String in CDR; the same notes give the same bytes."""
-    content = {"initial_state": _plain(said.initial_state), "std": _plain(said.std)}
+    content: dict[str, object] = {"initial_state": _plain(said.initial_state), "std": _plain(said.std)}
+    if said.remarks:
+        content["remarks"] = list(said.remarks)
     return encoded(ros.std_msgs__msg__String(json.dumps(content, sort_keys=True)), STRING_TYPE)
 
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from compass_ros.episodes.bag import RawMessage, RawTopic, decode, is_bag, scan
 from compass_ros.episodes.definitions import EPISODE_TYPES, SHOT_TYPES, STRING_TYPE
+from compass_ros.episodes.measured import left_out, measured
 from compass_ros.episodes.notes import NOTES_TOPIC, SHOT_TOPIC, EpisodeHeader, Notes, Shot, header, notes, shot
-from compass_ros.episodes.sources import KNOWN_TYPES, Row, Source, entries, rows
+from compass_ros.episodes.sources import KNOWN_TYPES, Row, Source, entries, plain_frame, rows
 from compass_ros.errors import BagError, nearest
 from compass_ros.types import Episode, Floats, Track
 
@@ -88,7 +89,7 @@ def read_bag(path: str | Path, sources: Sequence[Source], cell: str = "", cell_h
 
     Raises:
         BagError: The bag is missing, empty, truncated, foreign, of another cell, without a wanted topic, with more than
-            one shot, with poses that are not finite, or with stamps out of order.
+            one shot, without one usable measurement of an object, or with stamps out of order.
     """
     path = Path(path)
     content = _Content({source: [] for source in sources})
@@ -149,7 +150,8 @@ def _episode(path: Path, content: _Content, cell: str, cell_hash: str) -> Episod
         raise BagError(f"recorded in another cell: expected '{cell}', found '{head.cell}'")
     if cell_hash and head.cell_hash and head.cell_hash != cell_hash:
         raise BagError(f"recorded in another '{cell}': expected configuration {cell_hash}, found {head.cell_hash}")
-    tracks = tuple(_track(source, found, content) for source, found in content.tracks.items())
+    found = [_tracks(source, rows, content) for source, rows in content.tracks.items()]
+    tracks = tuple(track for (track, *_), _ in found)
     fired = _fired(content.shots, head)
     first_ns = min((int(track.stamp_ns[0]) for track in tracks), default=0)
     return Episode(
@@ -161,6 +163,8 @@ def _episode(path: Path, content: _Content, cell: str, cell_hash: str) -> Episod
         tracks=tracks,
         initial_state=content.notes.initial_state,
         source=str(path),
+        others=tuple(track for (_, *others), _ in found for track in others),
+        remarks=(*content.notes.remarks, *(remark for _, said in found for remark in said)),
     )
 
 
@@ -175,12 +179,42 @@ def _fired(shots: Sequence[tuple[str, Shot]], head: EpisodeHeader) -> Shot | Non
     return recent[0] if recent else None
 
 
-def _track(source: Source, found: Sequence[Row], content: _Content) -> Track:
+def _tracks(source: Source, found: Sequence[Row], content: _Content) -> tuple[tuple[Track, ...], list[str]]:
+    """The tracks of one object, one for each frame it is seen in, the one to use first; and what there is to say."""
     if not found:
         raise BagError(_no_messages(source, content))
-    once = [row for index, row in enumerate(found) if index == 0 or row != found[index - 1]]
+    frames: dict[str, list[Row]] = {}
+    for row in found:
+        frames.setdefault(row.frame, []).append(row)
+    ordered = sorted(frames, key=lambda name: len(frames[name]), reverse=True)
+    if source.frame:
+        wanted = plain_frame(source.frame)
+        if wanted not in frames:
+            raise BagError(
+                f"{source.topic}: {source.object} is not seen in the frame '{wanted}', but in {_some(ordered)}"
+            )
+        ordered.sort(key=lambda name: name != wanted)
+    tracks, remarks = zip(*(_track(source, frames[name], content) for name in ordered), strict=True)
+    said = [remark for remark in remarks[:1] if remark]
+    if len(frames) > 1 and not source.frame:
+        counts = ", ".join(f"'{name}' ({len(frames[name])} messages)" for name in ordered)
+        where = f"{source.object} is seen on {source.topic} in {len(frames)} frames, {counts}"
+        said.append(f"{where}: only '{ordered[0]}' is used; `frame` in the cell's YAML names another")
+    return tracks, said
+
+
+def _track(source: Source, found: Sequence[Row], content: _Content) -> tuple[Track, str]:
+    """Track of the rows of one frame, and what was left out of it."""
+    every = np.array([row.value for row in found], float)
+    kept = measured(every, source.quantity)
+    remark = left_out(every, source.quantity, f"messages of {source.object} on {source.topic}")
+    if not kept.any():
+        unset = source.quantity == "pose" and bool(np.isfinite(every).all())
+        hint = "; its positions alone are usable: `quantity: xyz`" if unset else ""
+        raise BagError(f"{remark}: nothing is left of {source.object}{hint}")
+    used = [row for row, use in zip(found, kept, strict=True) if use]
+    once = [row for index, row in enumerate(used) if index == 0 or row != used[index - 1]]
     stamps = np.array([row.stamp_ns for row in once], np.int64)
-    values = np.array([row.value for row in once], float)
     backwards = np.flatnonzero(np.diff(stamps) <= 0)
     if backwards.size:
         index = int(backwards[0]) + 1
@@ -188,8 +222,9 @@ def _track(source: Source, found: Sequence[Row], content: _Content) -> Track:
         how = f"{-step} ns before the one before it" if step else "as is the one before it"
         where = f"message {index + 1} of {source.object} is stamped {stamps[index]} ns, {how}"
         raise BagError(f"{source.topic}: stamps out of order: {where}")
+    values = np.array([row.value for row in once], float)
     std = _std(once, source, content.notes)
-    return Track(source.object, source.quantity, stamps, _finite(values, source, "pose"), std)
+    return Track(source.object, source.quantity, stamps, values, std, once[0].frame), remark
 
 
 def _std(found: Sequence[Row], source: Source, said: Notes) -> Floats | None:
@@ -199,17 +234,11 @@ def _std(found: Sequence[Row], source: Source, said: Notes) -> Floats | None:
         if noted is None:
             return None
         stated = list(noted) if len(noted) == len(found) else [noted[0]] * len(found)
-    return _finite(np.array(stated), source, "standard deviation")
-
-
-def _finite(values: Floats, source: Source, what: str) -> Floats:
-    bad = np.flatnonzero(~np.isfinite(values).reshape(len(values), -1).all(axis=1))
+    bad = np.flatnonzero(~np.isfinite(stated))
     if bad.size:
-        raise BagError(
-            f"{source.topic}: {what} of {source.object} is not finite in message {bad[0] + 1} "
-            f"({bad.size} of {len(values)} messages): {values[bad[0]]}"
-        )
-    return values
+        which = f"message {bad[0] + 1} ({bad.size} of {len(stated)} messages): {stated[bad[0]]}"
+        raise BagError(f"{source.topic}: standard deviation of {source.object} is not finite in {which}")
+    return np.array(stated)
 
 
 def _no_messages(source: Source, content: _Content) -> str:
@@ -218,6 +247,8 @@ def _no_messages(source: Source, content: _Content) -> str:
         wanted, others = source.entry or source.object, sorted(content.others.get(source, ()))
         what = f" of '{wanted}'" if source.entry or source.quantity == "joint" else ""
         there = f"; there are {_some(others)}{nearest(wanted, others)}" if others else ""
+        if wanted in others:
+            return f"{source.topic} names '{wanted}', but holds no '{source.quantity}' of it"
         return f"no messages{what} on {source.topic} ({source.object} was never seen){there}"
     known = f"it has {_some(names)}" if names else "it has no topics"
     return f"no topic {source.topic} for {source.object}; {known}{nearest(source.topic, names)}"

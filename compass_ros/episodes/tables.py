@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Sequence
 from dataclasses import field
 from fnmatch import fnmatchcase
@@ -17,7 +16,7 @@ from pydantic.dataclasses import dataclass
 
 from compass_ros.config import read_yaml
 from compass_ros.episodes.episode_writer import write_episode
-from compass_ros.episodes.names import episode_name
+from compass_ros.episodes.names import safe_name
 from compass_ros.episodes.table_files import FORMATS, Table
 from compass_ros.errors import BagError, ConfigError, DataError, nearest, shown
 from compass_ros.types import QUANTITY_SIZE, Episode, Floats, Ints, Quantity, Track
@@ -69,7 +68,7 @@ class Recordings:
     """In the data folder; a pattern, as `throw_*.csv`, stands for all files that match."""
     format: Literal["csv", "xlsx", "npz", "mat"]
     name: str
-    """Name of the episode, with {key}, {group}, {index}; other signs than letters, digits, `_`, `-`, `.` become `_`."""
+    """Name of the episode, with {key}, {group}, {index}; `names.safe_name` makes it a folder's."""
     tables: str = "*"
     """npz: pattern of the arrays' names; xlsx: of the sheets' names; mat: variables side by side, `time=T state=Y`."""
     group_by: str = ""
@@ -159,13 +158,13 @@ def _tables(recordings: Recordings, file: Path) -> list[Table]:
 
 
 def _episode(config: ImportConfig, recordings: Recordings, file: Path, table: Table) -> Episode:
-    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", _filled(recordings.name, table))
+    name = safe_name(_filled(recordings.name, table))
     try:
         stamps = _stamps(config.time, table)
         tracks = tuple(_track(target, columns, stamps, table) for target, columns in config.tracks.items())
         initial = {t: tuple(_rows(c, table, f"initial_state.{t}")[0].tolist()) for t, c in config.initial_state.items()}
         action = {t: float(_rows(c, table, f"action.{t}")[0, 0]) for t, c in config.action.items()}
-        return Episode(episode_name(name), config.cell, "", action, int(stamps[0]), tracks, initial)
+        return Episode(name, config.cell, "", action, int(stamps[0]), tracks, initial)
     except (DataError, BagError) as error:
         where = str(file) if name == file.stem else f"{file}: {name}"
         raise DataError(f"{where}: {error}") from error

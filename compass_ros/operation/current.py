@@ -101,7 +101,7 @@ def _inside(cell: Cell, name: str, value: float) -> float:
 def sources(cell: Cell) -> list[Source]:
     """Where the tracks of a cell's objects are in its bags; by default where tracker and import put them."""
     return [
-        Source(o.topic, o.name, o.quantity) if o.topic else default_sources([o.name], o.quantity)[0]
+        Source(o.topic or default_sources([o.name], o.quantity)[0].topic, o.name, o.quantity, frame=o.frame)
         for o in cell.objects
     ]
 

@@ -21,7 +21,17 @@ def doubts(cell: Cell, episodes: Sequence[Episode]) -> tuple[str, ...]:
     """One sentence each; empty when nothing is odd."""
     said = [_few(episodes), _alike(episodes)]
     said += [_unmoved(spec.name, episodes) for spec in cell.objects]
+    said += _remarks(episodes)
     return tuple(filter(None, said))
+
+
+def _remarks(episodes: Sequence[Episode]) -> list[str]:
+    """What reading said, each sentence once with the episodes that it is about."""
+    about: dict[str, list[str]] = {}
+    for episode in episodes:
+        for remark in episode.remarks:
+            about.setdefault(remark, []).append(episode.name)
+    return [f"{', '.join(names[:3])}{', ...' * (len(names) > 3)}: {remark}" for remark, names in about.items()]
 
 
 def _few(episodes: Sequence[Episode]) -> str:

@@ -1,7 +1,7 @@
 """Pinhole camera with lens distortion, and its pose over the table.
 
 Pixels are (u, v), u to the right, v down, with (0, 0) the centre of the first pixel. The distortion is OpenCV's
-(and ROS's) `plumb_bob` (k1 k2 p1 p2 k3) or `rational_polynomial` (k1 k2 p1 p2 k3 k4 k5 k6).
+(and ROS's) `plumb_bob` (k1 k2 p1 p2 k3) or `rational_polynomial` (k1 k2 p1 p2 k3 k4 k5 k6); numbers left out are zero.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from compass_ros.errors import TrackingError, shown
 from compass_ros.types import Floats
 
 _DISTORTION_SIZES = {"": (0,), "plumb_bob": (0, 4, 5), "rational_polynomial": (8,)}
+"""Numbers that OpenCV takes for each model."""
 _UNDISTORT = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-10)
 
 
@@ -117,16 +118,22 @@ def camera_model(
     if distortion_model not in _DISTORTION_SIZES:
         known = sorted(name for name in _DISTORTION_SIZES if name)
         raise TrackingError(f"{where}: distortion model '{distortion_model}' is not known; known are {known}")
-    d = np.asarray(distortion, dtype=np.float64).reshape(-1)
-    if d.size not in _DISTORTION_SIZES[distortion_model] or not np.all(np.isfinite(d)):
-        expected = _DISTORTION_SIZES[distortion_model]
-        raise TrackingError(
-            f"{where}: distortion model '{distortion_model}' expects {expected} coefficients, found {d.size}"
-        )
+    d = _coefficients(np.asarray(distortion, dtype=np.float64).reshape(-1), distortion_model, where)
     width, height = size
     if width <= 0 or height <= 0:
         raise TrackingError(f"{where}: image size must be positive, found {width}x{height}")
-    return CameraModel(width, height, (float(k[0]), float(k[4])), (float(k[2]), float(k[5])), tuple(d.tolist()))
+    return CameraModel(width, height, (float(k[0]), float(k[4])), (float(k[2]), float(k[5])), d)
+
+
+def _coefficients(given: Floats, model: str, where: str) -> tuple[float, ...]:
+    """As many numbers as OpenCV takes: zeros at the end mean the same as none, however many a driver sends."""
+    sizes = _DISTORTION_SIZES[model]
+    needed = int(np.flatnonzero(given)[-1]) + 1 if given.any() else 0
+    if not np.all(np.isfinite(given)) or needed > sizes[-1]:
+        found = f"{given.size} with the last that is not zero at place {needed}: {given.tolist()}"
+        raise TrackingError(f"{where}: distortion model '{model}' has at most {sizes[-1]} coefficients, found {found}")
+    size = given.size if given.size in sizes else next(size for size in sizes if size >= needed)
+    return tuple(np.pad(given[:size], (0, max(size - given.size, 0))).tolist())
 
 
 def read_camera(path: Path) -> CameraModel:

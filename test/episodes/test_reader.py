@@ -148,10 +148,15 @@ def test_joint_that_is_not_there(bag: Path) -> None:
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf")])
-def test_poses_that_are_not_finite(tmp_path: Path, bad: float) -> None:
+def test_poses_that_are_not_finite_are_left_out_and_counted(tmp_path: Path, bad: float) -> None:
     stamps = [START_NS + i * MS for i in range(5)]
-    found = complaint(pose_bag(tmp_path / "bag", stamps, [(0.0, 0.0)] * 3 + [(0.0, bad), (0.0, 0.0)]), PUCK1)
-    assert "puck1 is not finite in message 4 (1 of 5 messages)" in found
+    found = read_episode(pose_bag(tmp_path / "bag", stamps, [(0.0, 0.0)] * 3 + [(0.0, bad), (0.0, 0.0)]), PUCK1)
+    assert found.tracks[0].stamp_ns.tolist() == stamps[:3] + stamps[4:]
+    (remark,) = found.remarks
+    assert "1 of 5 messages of puck1" in remark
+    assert remark.endswith("(1 not finite): number 4")
+    nothing = complaint(pose_bag(tmp_path / "lost", stamps, [(0.0, bad)] * 5), PUCK1)
+    assert "nothing is left of puck1" in nothing
 
 
 def test_covariance_that_is_not_finite(tmp_path: Path) -> None:

@@ -61,7 +61,9 @@ def test_equal_cameras_are_equal() -> None:
     [
         ({"matrix": [0.0] * 9}, "not calibrated"),
         ({"distortion_model": "fisheye"}, "'fisheye' is not known; known are"),
-        ({"distortion": [0.1, 0.2]}, r"expects \(0, 4, 5\) coefficients, found 2"),
+        ({"distortion": [0.1] * 6}, r"'plumb_bob' has at most 5 coefficients, found 6 with"),
+        ({"distortion": [0.1, float("nan")]}, r"at most 5 coefficients, found 2 with .*nan"),
+        ({"distortion": [0.1] * 5, "distortion_model": ""}, r"'' has at most 0 coefficients, found 5"),
         ({"size": (0, 480)}, "found 0x480"),
     ],
 )
@@ -73,6 +75,25 @@ def test_bad_camera_info_gets_one_line(changes: dict[str, object], message: str)
     with pytest.raises(TrackingError, match=message) as caught:
         camera_model(**(good | changes))  # type: ignore[arg-type]
     assert str(caught.value).startswith("camera_info: ")
+
+
+@pytest.mark.parametrize(
+    ("model", "given", "needed"),
+    [
+        ("plumb_bob", [-0.03, 0.035, -1e-4, -1e-4, -0.012, 0, 0, 0], [-0.03, 0.035, -1e-4, -1e-4, -0.012]),
+        ("plumb_bob", [0.1, -0.2], [0.1, -0.2, 0, 0]),
+        ("plumb_bob", [0.1], [0.1, 0, 0, 0]),
+        ("plumb_bob", [0.0] * 14, []),
+        ("plumb_bob", [0.1, 0, 0, 0, 0.2], [0.1, 0, 0, 0, 0.2]),
+        ("rational_polynomial", [0.1, -0.2, 0, 0, 0.3], [0.1, -0.2, 0, 0, 0.3, 0, 0, 0]),
+        ("rational_polynomial", [0.1] * 8 + [0] * 6, [0.1] * 8),
+        ("rational_polynomial", [], [0] * 8),
+        ("", [0.0] * 5, []),
+    ],
+)
+def test_zeros_at_the_end_of_the_distortion_mean_nothing(model: str, given: list[float], needed: list[float]) -> None:
+    matrix = [600.0, 0, 320, 0, 600, 240, 0, 0, 1]
+    assert camera_model((640, 480), matrix, model, given, "x").coefficients == tuple(needed)
 
 
 def test_calibration_file(tmp_path: Path) -> None:
