@@ -131,6 +131,6 @@ def calibrate(plan: Plan, nodes: NodeGroup, report: Report) -> None:
     )
     for line in nodes.follow(client):
         if "stage" in line:
-            gap, sparsity = (math.nan if line[name] is None else line[name] for name in ("gap_m", "sparsity"))
+            gap, sparsity = (math.nan if line[name] is None else line[name] for name in ("gap", "sparsity"))
             report(Progress(line["stage"], line["iteration"], line["share_done"] or 0.0, gap, sparsity))
     nodes.stop(client, calibrator)

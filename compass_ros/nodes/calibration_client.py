@@ -21,7 +21,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.task import Future
 
-FIELDS = ("stage", "iteration", "share_done", "gap_m", "sparsity", "seconds_left")
+FIELDS = ("stage", "iteration", "share_done", "gap", "unit", "sparsity", "seconds_left")
 
 
 class CalibrationClient(Node):
@@ -59,7 +59,7 @@ class CalibrationClient(Node):
             rclpy.spin_until_future_complete(self, handle.cancel_goal_async(), timeout_sec=2.0)
             raise
         result = answer.result().result
-        names = ("success", "message", "result_json", "gap_nominal", "gap_calibrated", "verdict", "sentence")
+        names = ("success", "message", "result_json", "gap_nominal", "gap_calibrated", "unit", "verdict", "sentence")
         say({name: getattr(result, name) for name in names})
         return "" if result.success else str(result.message)
 

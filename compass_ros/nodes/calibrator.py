@@ -23,13 +23,14 @@ from std_srvs.srv import Trigger
 from compass_ros.cells import load
 from compass_ros.errors import CompassError, ConfigError, shown
 from compass_ros.nodes import convert
-from compass_ros.nodes.job import Job, Outcome, Request
+from compass_ros.nodes.job import Job, Outcome, Request, Step
 from compass_ros.nodes.journal import cut_off
 from compass_ros.nodes.managed import ManagedNode
 from compass_ros.nodes.operator import Operator
 from compass_ros.nodes.qos import LATCHED
 from compass_ros.nodes.requests import checked_output, checked_paths, one_line
 from compass_ros.nodes.run import run
+from compass_ros.operation.current import current
 from compass_ros.operation.desk import Desk
 from compass_ros.reporting.result_json import read_result
 
@@ -86,14 +87,14 @@ class Calibrator(ManagedNode):
         cell = load(self.get_parameter("cell").value)
         versions, false_alarm = Path(self.get_parameter("versions").value), self.get_parameter("false_alarm").value
         desk = Desk(cell, versions, self._output(), false_alarm)
-        self._cell_name = cell.name
+        self._cell_name, self._unit = cell.name, current(cell, threads=1).simulator.unit
         self._parameters_topic = self.create_publisher(SimParameters, "~/sim_parameters", LATCHED)
         self._graph_topic = self.create_publisher(CausalGraph, "~/causal_graph", LATCHED)
         self._mismatch_topic = self.create_publisher(Mismatch, "~/mismatch", LATCHED)
         self._status_topic = self.create_publisher(CalibrationStatus, "~/status", LATCHED)
         self._diagnostics_topic = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._operator = Operator(self, desk, self.get_parameter("running_check").value)
-        self._say(convert.status_message(CalibrationStatus.IDLE, self._header()))
+        self._tell(CalibrationStatus.IDLE)
 
         self.create_subscription(EpisodeInfo, "recorder/status", self._on_episode, 100)
         self._action_server = ActionServer(
@@ -155,7 +156,7 @@ class Calibrator(ManagedNode):
             anew = bool(self.get_parameter("resume").value)
             message = one_line(f"{lost}; {'it begins anew' if anew else 'it is not resumed'}")
             self.get_logger().warning(message)
-            self._say(convert.status_message(CalibrationStatus.IDLE, self._header(), message=message))
+            self._tell(CalibrationStatus.IDLE, message=message)
             if anew:
                 return Calibrate.Goal(
                     bags=list(lost.bags), cell=lost.cell, seed=lost.seed, rollouts=lost.rollouts, output=lost.output
@@ -195,7 +196,7 @@ class Calibrator(ManagedNode):
         with self._claim:
             self._refuse_a_second()
             self._running = Job.start(self._request(goal))
-            self._say(convert.status_message(CalibrationStatus.RUNNING, self._header()))
+            self._tell(CalibrationStatus.RUNNING)
             return self._running
 
     def _refuse_a_second(self) -> None:
@@ -225,7 +226,7 @@ class Calibrator(ManagedNode):
         if job.outcome is Outcome.FAILED:
             return self._fail(handle, job.message)
         if job.outcome is Outcome.CANCELLED:
-            self._say(convert.status_message(CalibrationStatus.CANCELLED, self._header(), message=job.message))
+            self._tell(CalibrationStatus.CANCELLED, message=job.message)
             if handle.is_cancel_requested:
                 handle.canceled()
             else:  # the node ends, or is deactivated
@@ -233,13 +234,13 @@ class Calibrator(ManagedNode):
             return self._without_result(job.message)
         answer = self._publish(job.output / "result.json", job.message)
         self._the_operator.propose(job.output)
-        self._say(convert.status_message(CalibrationStatus.SUCCEEDED, self._header(), message=job.message))
+        self._tell(CalibrationStatus.SUCCEEDED, message=job.message)
         handle.succeed()
         return answer
 
     def _fail(self, handle: ServerGoalHandle, message: str) -> Calibrate.Result:
         self.get_logger().error(message)
-        self._say(convert.status_message(CalibrationStatus.FAILED, self._header(), message=message))
+        self._tell(CalibrationStatus.FAILED, message=message)
         handle.abort()
         return self._without_result(message)
 
@@ -249,9 +250,9 @@ class Calibrator(ManagedNode):
             if handle.is_cancel_requested:
                 job.cancel()
             for step in job.steps():
-                status = convert.status_message(CalibrationStatus.RUNNING, self._header(), step)
-                self._say(status)
-                feedback = Calibrate.Feedback(iteration=status.iteration, gap_m=status.gap_m, stage=status.stage)
+                status = self._tell(CalibrationStatus.RUNNING, step)
+                feedback = Calibrate.Feedback(iteration=status.iteration, stage=status.stage)
+                feedback.gap, feedback.unit = status.gap, status.unit
                 feedback.sparsity, feedback.share_done = status.sparsity, status.share_done
                 feedback.seconds_left = status.seconds_left
                 handle.publish_feedback(feedback)
@@ -271,6 +272,7 @@ class Calibrator(ManagedNode):
             result_json=str(path),
             gap_nominal=convert.mean_gap(result, "nominal"),
             gap_calibrated=convert.mean_gap(result, "calibrated"),
+            unit=convert.unit(result),
             verdict=result["mismatch"]["verdict"],
             sentence=result["mismatch"]["sentence"],
         )
@@ -278,9 +280,10 @@ class Calibrator(ManagedNode):
     def _without_result(self, message: str) -> Calibrate.Result:
         return Calibrate.Result(success=False, message=message, gap_nominal=math.nan, gap_calibrated=math.nan)
 
-    def _say(self, status: CalibrationStatus) -> None:
-        self._status = status
-        self._status_topic.publish(status)
+    def _tell(self, state: int, step: Step | None = None, message: str = "") -> CalibrationStatus:
+        self._status = convert.status_message(state, self._header(), self._unit, step, message)
+        self._status_topic.publish(self._status)
+        return self._status
 
     def _diagnose(self) -> None:
         array = convert.status_diagnostics(self._status, self.get_name(), self._header())

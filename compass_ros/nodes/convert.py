@@ -35,6 +35,11 @@ def number(value: float | None) -> float:
     return math.nan if value is None else float(value)
 
 
+def unit(result: Json) -> str:
+    """Of the result's distances; results of version 0.1 do not say it, and are in metres."""
+    return str(result["gap"].get("unit", "m"))
+
+
 def parameters_message(result: Json, header: Header, source: str) -> SimParameters:
     """The calibrated parameters; `source` is the path of the result.json."""
     rows = [
@@ -80,8 +85,9 @@ def mismatch_message(result: Json, header: Header) -> Mismatch:
         undetectable=mismatch["undetectable"],
         next_experiment=mismatch["next_experiment"] or "",
         sentence=mismatch["sentence"],
-        gaps=gap_messages(result["gap"]),
-        noise_floor_m=number(result["gap"]["noise_floor_m"]),
+        gaps=gap_messages(result),
+        noise_floor=number(result["gap"]["noise_floor_m"]),
+        unit=unit(result),
     )
 
 
@@ -101,15 +107,17 @@ def effect_message(effect: Json) -> Effect:
     )
 
 
-def gap_messages(gap: Json) -> list[Gap]:
+def gap_messages(result: Json) -> list[Gap]:
     """One message for each model and set of episodes that the result has."""
+    gap = result["gap"]
     return [
         Gap(
             model=model,
             episodes=episodes,
             factors=list(one["d"]),
             d=[number(value) for value in one["d"].values()],
-            rmse_m=number(one["rmse_m"]),
+            rmse=number(one["rmse_m"]),
+            unit=unit(result),
         )
         for model in MODELS
         for episodes in EPISODES
@@ -118,7 +126,7 @@ def gap_messages(gap: Json) -> list[Gap]:
 
 
 def mean_gap(result: Json, model: str) -> float:
-    """Mean trajectory difference over the factors [m], on held-out episodes where there are any, else on the fitted.
+    """Mean trajectory difference over the factors, on held-out episodes where there are any, else on the fitted.
 
     NaN for a model that was not fitted.
     """
@@ -127,14 +135,16 @@ def mean_gap(result: Json, model: str) -> float:
     return fmean(number(value) for value in found["d"].values()) if found else math.nan
 
 
-def status_message(state: int, header: Header, step: Step | None = None, message: str = "") -> CalibrationStatus:
-    """What the calibrator does now; `step` while it runs."""
-    status = CalibrationStatus(header=header, state=state, message=message)
-    status.gap_m = status.sparsity = status.seconds_left = math.nan
+def status_message(
+    state: int, header: Header, unit: str, step: Step | None = None, message: str = ""
+) -> CalibrationStatus:
+    """What the calibrator does now; `step` while it runs; `unit` of the gap."""
+    status = CalibrationStatus(header=header, state=state, unit=unit, message=message)
+    status.gap = status.sparsity = status.seconds_left = math.nan
     if step is not None:
         status.stage = step.progress.stage
         status.iteration = step.progress.iteration
-        status.gap_m = step.progress.gap
+        status.gap = step.progress.gap
         status.sparsity = step.progress.sparsity
         status.share_done = step.progress.done
         status.seconds_left = step.seconds_left
@@ -157,7 +167,7 @@ def status_diagnostics(status: CalibrationStatus, node: str, header: Header) -> 
     values = {
         "stage": status.stage,
         "iteration": str(status.iteration),
-        "trajectory difference [m]": f"{status.gap_m:.4g}",
+        f"trajectory difference [{status.unit}]": f"{status.gap:.4g}",
         "sparsity": f"{status.sparsity:.3f}",
         "share done": f"{status.share_done:.3f}",
         "seconds left": f"{status.seconds_left:.0f}",
