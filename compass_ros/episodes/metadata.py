@@ -12,6 +12,7 @@ from compass_ros.errors import BagError
 from compass_ros.plain_yaml import LARGEST, plain_yaml
 
 FILE_NAME = "metadata.yaml"
+_KEY = "rosbag2_bagfile_information"
 
 
 @dataclass(frozen=True)
@@ -40,17 +41,16 @@ class BagSummary:
     compression: str = ""
 
 
-def summary_text(summary: BagSummary) -> str:
-    """The YAML of rosbag2 version 9 (Jazzy) for a bag."""
-    content = {"rosbag2_bagfile_information": _content(summary)}
-    return yaml.dump(content, Dumper=_PlainDumper, sort_keys=False, width=1000)
+def record_text(summary: BagSummary) -> str:
+    """What rosbag2 writes into the MCAP file itself: the content of metadata.yaml without the key around it."""
+    return _yaml(_content(summary))
 
 
 def write_summary(folder: Path, summary: BagSummary) -> None:
     """Write metadata.yaml in one step: a temporary file beside it, renamed when it is complete. Raises OSError."""
     temporary = folder / (FILE_NAME + ".tmp")
     with temporary.open("w", encoding="utf-8") as file:
-        file.write(summary_text(summary))
+        file.write(_yaml({_KEY: _content(summary)}))
     temporary.replace(folder / FILE_NAME)
 
 
@@ -61,7 +61,7 @@ def read_summary(folder: Path) -> BagSummary:
         if path.stat().st_size > LARGEST:
             raise BagError(f"{path}: larger than {LARGEST} bytes; expected a rosbag2 metadata.yaml")
         content = plain_yaml(path.read_text(encoding="utf-8"))
-        information = content["rosbag2_bagfile_information"]
+        information = content[_KEY]
         return BagSummary(
             storage=_text(information["storage_identifier"]),
             files=tuple(Path(_text(name)).name for name in information["relative_file_paths"]),
@@ -76,6 +76,11 @@ def read_summary(folder: Path) -> BagSummary:
     except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         found = " ".join(str(error).split())[:200]
         raise BagError(f"{path}: expected a rosbag2 metadata.yaml, found {type(error).__name__}: {found}") from error
+
+
+def _yaml(content: Mapping[str, object]) -> str:
+    """As rosbag2 version 9 (Jazzy) has it."""
+    return yaml.dump(content, Dumper=_PlainDumper, sort_keys=False, width=1000)
 
 
 def qos_profiles(text: str) -> list[object]:

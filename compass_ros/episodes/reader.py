@@ -112,6 +112,8 @@ class _Content:
     def __init__(self, tracks: dict[Source, list[Row]]) -> None:
         self.tracks = tracks
         self.counts: dict[RawTopic, int] = {}
+        self.latched: dict[Source, list[Row]] = {}
+        """Rows from before the episode: all there is of an object whose pose was published once."""
         self.headers: list[EpisodeHeader] = []
         self.shots: list[tuple[str, Shot]] = []
         self.others: dict[Source, set[str]] = {}
@@ -127,6 +129,8 @@ class _Content:
         if topic.ros1:
             pass  # our own messages are ROS 2 ones
         elif topic.type in EPISODE_TYPES:
+            if not self.headers:
+                self._begin()
             self.headers.append(header(decode(message)))
         elif topic.type in SHOT_TYPES:
             self.shots.append((topic.name, shot(decode(message))))
@@ -143,6 +147,12 @@ class _Content:
                 self.others.setdefault(source, set()).update(entries(decoded, topic.type))
             self.tracks[source] += found
 
+    def _begin(self) -> None:
+        """What stands before the first header is latched: it came before the episode, and is its state, not its motion."""
+        self.latched = {source: found for source, found in self.tracks.items() if found}
+        self.tracks = {source: [] for source in self.tracks}
+        self.shots.clear()
+
 
 def _episode(path: Path, content: _Content, cell: str, cell_hash: str) -> Episode:
     head = content.headers[0] if content.headers else EpisodeHeader("finished", path.stem)
@@ -150,7 +160,7 @@ def _episode(path: Path, content: _Content, cell: str, cell_hash: str) -> Episod
         raise BagError(f"recorded in another cell: expected '{cell}', found '{head.cell}'")
     if cell_hash and head.cell_hash and head.cell_hash != cell_hash:
         raise BagError(f"recorded in another '{cell}': expected configuration {cell_hash}, found {head.cell_hash}")
-    found = [_tracks(source, rows, content) for source, rows in content.tracks.items()]
+    found = [_tracks(source, rows or content.latched.get(source, []), content) for source, rows in content.tracks.items()]
     tracks = tuple(track for (track, *_), _ in found)
     fired = _fired(content.shots, head)
     first_ns = min((int(track.stamp_ns[0]) for track in tracks), default=0)

@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 
 from compass_ros.episodes.definitions import EPISODE_TYPE, SHOT_TYPE, Definition, embedded_definition
+from compass_ros.episodes.latched import Latched
 from compass_ros.episodes.names import episode_name, next_name
 from compass_ros.episodes.notes import EPISODE_TOPIC, SHOT_TOPIC, EpisodeHeader, Shot, State, header_bytes, shot_bytes
 from compass_ros.episodes.recovery import unfinished
@@ -28,6 +29,8 @@ class Connection:
     definition: Definition
     qos: str = ""
     """The publishers' QoS profiles as a YAML list."""
+    latched: int = 0
+    """Publishers seen so far that keep their last messages for whoever comes later; 0: the topic is not latched."""
 
 
 @cache
@@ -64,6 +67,7 @@ class Recorder:
         self._max_duration_ns = max_duration_ns
         self._lock = _hold(folder)
         self._connections: dict[str, Connection] = {}
+        self._latched: dict[str, Latched] = {}
         self._sequences: dict[str, int] = {}
         self._writer: BagWriter | None = None
         self._channels: dict[tuple[str, Definition], int] = {}
@@ -84,18 +88,24 @@ class Recorder:
             raise BagError(f"{self.folder}: {error.strerror}") from error
 
     def connect(self, connection: Connection) -> None:
-        """A topic can be received now, or has changed its type."""
-        before = self._connections.get(connection.topic)
+        """A topic can be received now, has changed its type, or is latched by more publishers."""
+        before = self._connections.get(connection.topic, connection)
         self._connections[connection.topic] = connection
         self._sequences.pop(connection.topic, None)
+        changed = before.definition != connection.definition
+        if changed or not connection.latched:
+            self._latched.pop(connection.topic, None)
         if self._writer is not None:
-            if before is not None and before.definition != connection.definition:
+            if changed:
                 change = f"{connection.topic} changed from {before.definition.type} to {connection.definition.type}"
                 self._losses.retyped.append(change)
             self._declare(self._writer, connection)
 
     def start(self, name: str, cell: str, cell_hash: str, action: Mapping[str, float], now_ns: int) -> EpisodeHeader:
-        """Begin an episode; an empty name is numbered. Raises BagError: one is running, bad name, no space, exists."""
+        """Begin an episode; an empty name is numbered. Raises BagError: one is running, bad name, no space, exists.
+
+        Its bag begins with the latched messages that came before; the header (EpisodeInfo) comes after them.
+        """
         if self._writer is not None:
             raise BagError(f"episode {self.status.episode} is being recorded; stop or discard it first")
         free = self.free_bytes()
@@ -108,6 +118,10 @@ class Recorder:
         self.status = EpisodeHeader("recording", name, cell, cell_hash, now_ns, bag=str(writer.folder))
         for connection in (_headers(), *self._connections.values()):
             self._declare(writer, connection)
+        for topic, latched in self._latched.items():
+            connection = self._connections[topic]
+            for data, publish_ns in latched.standing(connection.latched):
+                self._write(connection, now_ns, publish_ns, data)
         self._write(
             _headers(), now_ns, now_ns, header_bytes(replace(self.status, bag="", topics=tuple(self._connections)))
         )
@@ -117,7 +131,7 @@ class Recorder:
         return self.progress()
 
     def take(self, topic: str, data: bytes, log_ns: int, publish_ns: int, sequence: int | None = None) -> None:
-        """One message of a connected topic; ignored between episodes.
+        """One message of a connected topic; between episodes only latched ones matter, to the next.
 
         Args:
             sequence: The publisher's count of its messages, where the topic has one publisher: gaps are lost messages.
@@ -125,6 +139,9 @@ class Recorder:
         Raises:
             BagError: The disk refuses; the episode is over and has failed.
         """
+        connection = self._connections[topic]
+        if connection.latched:
+            self._latched.setdefault(topic, Latched()).keep(publish_ns, data)
         if self._writer is None:
             return
         if sequence is not None:
@@ -132,7 +149,7 @@ class Recorder:
             if gap > 0:
                 self._losses.lost[topic] = self._losses.lost.get(topic, 0) + gap
             self._sequences[topic] = sequence
-        self._write(self._connections[topic], log_ns, publish_ns, data)
+        self._write(connection, log_ns, publish_ns, data)
 
     def overdue(self, now_ns: int) -> bool:
         """Whether the episode has lasted longer than it may."""

@@ -1,51 +1,23 @@
 """Crash-safe writing of a rosbag2 MCAP bag.
 
-Every message is one record in the file as soon as it is written: no chunks, no buffer in this process. A process that
-is killed loses nothing that it had written; what is left is a file without an end, in a folder without metadata.yaml,
-which `recovery.recover` makes whole. A write that fails (disk full) is taken back: the file ends on a whole record.
+Every message is in the file as soon as it is written, also that of a chunk that is not full yet (`chunks.py`). A process
+that is killed loses nothing that it had written; what is left is a file without an end, in a folder without
+metadata.yaml, which `recovery.recover` makes whole. A write that fails (disk full) is taken back: the file ends on a whole
+record.
 """
 
 from __future__ import annotations
 
-import fcntl
 import os
 from pathlib import Path
-from typing import IO, cast
 
-from mcap.writer import CompressionType, IndexType, Writer
-
+from compass_ros.episodes.chunks import ChunkedFile
 from compass_ros.episodes.definitions import Definition
-from compass_ros.episodes.metadata import BagSummary, TopicCount, summary_text, write_summary
+from compass_ros.episodes.metadata import BagSummary, TopicCount, record_text, write_summary
+from compass_ros.episodes.record_file import RecordFile
 from compass_ros.errors import BagError
 
 LIBRARY = "compass_ros"
-
-
-class _RecordFile:
-    """A file to which each write is made whole or not at all. Locked while open: nobody recovers it meanwhile."""
-
-    def __init__(self, path: Path) -> None:
-        self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
-        fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        self._end = 0
-
-    def write(self, data: bytes) -> int:
-        rest = memoryview(data)
-        try:
-            while rest:
-                rest = rest[os.write(self._descriptor, rest) :]
-        except OSError:
-            os.ftruncate(self._descriptor, self._end)
-            os.lseek(self._descriptor, self._end, os.SEEK_SET)
-            raise
-        self._end += len(data)
-        return len(data)
-
-    def tell(self) -> int:
-        return self._end
-
-    def close(self) -> None:
-        os.close(self._descriptor)
 
 
 def sync_bag(folder: Path) -> None:
@@ -83,15 +55,8 @@ class BagWriter:
         self.last_ns = 0
         """Log time of the last message."""
         try:
-            self._file = _RecordFile(self.path)
-            self._mcap = Writer(
-                cast(IO[bytes], self._file),
-                compression=CompressionType.NONE,
-                index_types=IndexType.METADATA,
-                use_chunking=False,
-                enable_data_crcs=True,
-            )
-            self._mcap.start(profile="ros2", library=LIBRARY)
+            self._file = RecordFile(self.path)
+            self._mcap = ChunkedFile(self._file, LIBRARY)
         except OSError as error:
             raise BagError(f"{self.path}: cannot be written: {error.strerror}") from error
 
@@ -117,9 +82,9 @@ class BagWriter:
         key = (definition.type, definition.text)
         if key not in self._schemas:
             text = definition.text.encode()
-            self._schemas[key] = self._mcap.register_schema(definition.type, definition.encoding, text)
+            self._schemas[key] = self._mcap.add_schema(definition.type, definition.encoding, text)
         metadata = {"offered_qos_profiles": qos, "topic_type_hash": definition.digest}
-        channel = self._mcap.register_channel(name, "cdr", self._schemas[key], metadata)
+        channel = self._mcap.add_channel(name, self._schemas[key], metadata)
         self._topics[channel] = TopicCount(name, definition.type, definition.digest, 0, qos)
         self._counts[channel] = 0
         return channel
@@ -132,7 +97,7 @@ class BagWriter:
             self.clock_steps += 1
         self.last_ns = max(log_ns, self.last_ns)
         try:
-            self._mcap.add_message(channel, self.last_ns, data, publish_ns, sequence=self._counts[channel])
+            self._mcap.add_message(channel, self.last_ns, publish_ns, data)
         except OSError as error:
             raise BagError(f"{self.path}: {error.strerror} after {self.messages} messages") from error
         self._counts[channel] += 1
@@ -151,8 +116,7 @@ class BagWriter:
             ),
         )
         try:
-            self._mcap.add_metadata("rosbag2", {"serialized_metadata": summary_text(summary)})
-            self._mcap.finish()  # type: ignore[no-untyped-call]
+            self._mcap.finish("rosbag2", {"serialized_metadata": record_text(summary)})
             write_summary(self.folder, summary)
         except OSError as error:
             raise BagError(f"{self.folder}: cannot be finished: {error.strerror}") from error

@@ -123,6 +123,7 @@ class RecorderNode(ManagedNode):
                 raise BagError(f"the recorder is {self.state}; activate it first")
             cell = checked_text(request.cell, "cell") or self._text("cell")
             cell_hash = checked_text(request.cell_hash, "cell_hash") or self._text("cell_hash")
+            self._watch.update()  # latched topics: who has published so far
             status = self._running.start(request.episode, cell, cell_hash, checked_action(request), self._now_ns())
         except BagError as error:
             response.message = str(error)

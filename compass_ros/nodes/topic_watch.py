@@ -34,7 +34,8 @@ class TopicWatch:
     ) -> None:
         """`topics`: where messages are received -> the name under which they are handed on.
 
-        `connected` is called when a topic is found and when its type changes, before its first message."""
+        `connected` is called when a topic is found, when its type changes, before its first message, and when one that is
+        latched gets another publisher."""
         self._node = node
         self._topics = dict(topics)
         self._depth = depth
@@ -43,6 +44,8 @@ class TopicWatch:
         self._subscriptions: dict[str, Subscription] = {}
         self._connections: dict[str, Connection] = {}
         self._publishers: dict[str, int] = {}
+        self._latching: dict[str, set[tuple[int, ...]]] = {}
+        """The publishers seen so far on each topic that is latched."""
         self._problems: dict[str, str] = {}
 
     def update(self) -> None:
@@ -70,6 +73,8 @@ class TopicWatch:
         if len(types) > 1:
             self._problems[topic] = f"{topic} is published with {len(types)} types: {', '.join(sorted(types))}"
         if now is not None and now.definition.type in types:
+            if self._latches(topic, publishers) > now.latched:
+                self._connect(topic, now.definition, publishers)
             return
         if topic in self._subscriptions:  # one participant holds one type of a topic, until the executor lets go of it
             self._node.destroy_subscription(self._subscriptions.pop(topic))
@@ -77,11 +82,26 @@ class TopicWatch:
         kind = min(types)
         offered = [publisher for publisher in publishers if publisher.topic_type == kind]
         definition, message_class = _definition(kind, offered), _class(kind)
-        self._connections[topic] = Connection(self._topics[topic], definition, qos_yaml(offered))
-        self._connected(self._connections[topic])
-        receive = partial(self._receive, topic)
         profile = matching_qos(offered, self._depth)
+        self._latching.pop(topic, None)
+        if profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+            self._latching[topic] = set()
+        self._connect(topic, definition, offered)
+        receive = partial(self._receive, topic)
         self._subscriptions[topic] = self._node.create_subscription(message_class, topic, receive, profile, raw=True)
+
+    def _connect(self, topic: str, definition: Definition, publishers: Sequence[TopicEndpointInfo]) -> None:
+        latched = self._latches(topic, publishers)
+        self._connections[topic] = Connection(self._topics[topic], definition, qos_yaml(publishers), latched)
+        self._connected(self._connections[topic])
+
+    def _latches(self, topic: str, publishers: Sequence[TopicEndpointInfo]) -> int:
+        """How many publishers a latched topic has had, with these; 0 for one that is not latched."""
+        seen = self._latching.get(topic)
+        if seen is None:
+            return 0
+        seen.update(tuple(publisher.endpoint_gid) for publisher in publishers)
+        return len(seen)
 
     def _receive(self, topic: str, data: bytes, info: Mapping[str, int | None]) -> None:
         sequence = info["publication_sequence_number"] if self._publishers[topic] == 1 else None
