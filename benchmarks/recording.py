@@ -89,7 +89,7 @@ def flushed(folder: Path) -> tuple[Take, Callable[[], object]]:
         nonlocal last_ns
         writer.add_message(channel, at_ns, data, at_ns)
         if at_ns - last_ns >= FLUSH_NS:
-            writer.flush()
+            writer.flush()  # type: ignore[no-untyped-call]
             last_ns = at_ns
 
     return take, writer.finish
@@ -100,12 +100,12 @@ def rewritten(folder: Path) -> tuple[Take, Callable[[], object]]:
     writer, channel = plain_writer(raw, chunks=False)
 
     def finish() -> None:
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
         copy, to = plain_writer(indexed, chunks=True)
         with raw.open("rb") as file:
             for _, _, message in make_reader(file).iter_messages(log_time_order=False):
                 copy.add_message(to, message.log_time, message.data, message.publish_time)
-        copy.finish()
+        copy.finish()  # type: ignore[no-untyped-call]
         indexed.replace(raw)
 
     return lambda at_ns, data: writer.add_message(channel, at_ns, data, at_ns), finish

@@ -1,7 +1,7 @@
 """CRC-32 of two pieces put together, from theirs: zlib has it (`crc32_combine`), Python's module does not show it.
 
-The checksum of A + B is that of A times x^(8 |B|), modulo the polynomial, plus that of B. A polynomial is a number whose
-bit 31 is the coefficient of 1, as in zlib's crc32.c.
+The checksum of A + B is that of A times x^(8 |B|), modulo the polynomial, plus that of B. A polynomial is a number
+whose bit 31 is the coefficient of 1, as in zlib's crc32.c.
 """
 
 from __future__ import annotations

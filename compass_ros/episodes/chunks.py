@@ -1,10 +1,10 @@
 """An MCAP file with chunks and index, of which no record is ever held back.
 
-A chunk's header states length and checksum of its records, so writers keep a chunk in memory until it is full, and lose
-it when they are killed. Here the records of a chunk that is open stand in the file where they will stay, behind a record
-for private use that is as long as the header: at every moment the file is one without chunks that ends after its last
-record, and any reader that goes from front to back reads it. A full chunk gets its header by one write of 49 bytes over
-that private record, and its message index behind it.
+A chunk's header states length and checksum of its records, so writers keep a chunk in memory until it is full, and
+lose it when they are killed. Here the records of a chunk that is open stand in the file where they will stay, behind a
+record for private use that is as long as the header: at every moment the file is one without chunks that ends after its
+last record, and any reader that goes from front to back reads it. A full chunk gets its header by one write of 49 bytes
+over that private record, and its message index behind it.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ from compass_ros.episodes.checksum import joined
 from compass_ros.episodes.record_file import RecordFile
 
 CHUNK_BYTES = 2**20
-"""A chunk that has so much is closed: what a look into the middle of a recording reads at least. As mcap's own writer."""
+"""A chunk that has so much is closed: what a look into the middle of a recording reads. As in mcap's writer."""
 
 _MESSAGE = struct.Struct("<BQHIQQ")
 """A message without its data: opcode, length, channel, sequence, log time, publish time."""
 
 _CHUNK = struct.Struct("<BQQQQIIQ")
-"""An uncompressed chunk without its records: opcode, length, first and last log time, their size, their checksum, length
-of the compression's name (0: none), their size."""
+"""An uncompressed chunk without its records: opcode, length, first and last log time, their size, their checksum,
+length of the compression's name (0: none), their size."""
 
 _FOOTER = struct.Struct("<BQQQ")
 """A footer without its checksum, which covers this too: opcode, length, where the summary and its offsets begin."""
@@ -98,9 +98,7 @@ class ChunkedFile:
     def add_channel(self, topic: str, schema: int, metadata: Mapping[str, str]) -> int:
         """Declare a topic; its number."""
         number = len(self._channels) + 1
-        channel = Channel(
-            id=number, topic=topic, message_encoding="cdr", metadata=dict(metadata), schema_id=schema
-        )
+        channel = Channel(id=number, topic=topic, message_encoding="cdr", metadata=dict(metadata), schema_id=schema)
         self._channels.append(channel)
         self._undeclared.append(channel)
         return number
@@ -207,4 +205,4 @@ def _bytes(records: Iterable[McapRecord]) -> bytes:
     builder = RecordBuilder()
     for record in records:
         record.write(builder)
-    return builder.end()
+    return bytes(builder.end())  # type: ignore[no-untyped-call]

@@ -148,7 +148,7 @@ class _Content:
             self.tracks[source] += found
 
     def _begin(self) -> None:
-        """What stands before the first header is latched: it came before the episode, and is its state, not its motion."""
+        """What stands before the first header is latched: it came before the episode and is no sample of its motion."""
         self.latched = {source: found for source, found in self.tracks.items() if found}
         self.tracks = {source: [] for source in self.tracks}
         self.shots.clear()

@@ -1,9 +1,8 @@
 """Crash-safe writing of a rosbag2 MCAP bag.
 
-Every message is in the file as soon as it is written, also that of a chunk that is not full yet (`chunks.py`). A process
-that is killed loses nothing that it had written; what is left is a file without an end, in a folder without
-metadata.yaml, which `recovery.recover` makes whole. A write that fails (disk full) is taken back: the file ends on a whole
-record.
+Every message is in the file as soon as it is written, also in a chunk that is not full (`chunks.py`). A process that
+is killed loses nothing that it had written; what is left is a file without an end, in a folder without metadata.yaml,
+which `recovery.recover` makes whole. A write that fails (disk full) is taken back: the file ends on a whole record.
 """
 
 from __future__ import annotations

@@ -34,8 +34,8 @@ class TopicWatch:
     ) -> None:
         """`topics`: where messages are received -> the name under which they are handed on.
 
-        `connected` is called when a topic is found, when its type changes, before its first message, and when one that is
-        latched gets another publisher."""
+        `connected` is called when a topic is found and when its type changes, before its first message, and when a
+        latched topic gets another publisher."""
         self._node = node
         self._topics = dict(topics)
         self._depth = depth

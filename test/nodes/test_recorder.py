@@ -11,12 +11,14 @@ from compass_ros_interfaces.srv import StartEpisode, StopEpisode
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from mcap.reader import make_reader
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.highlevel import AnyReader
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from compass_ros.episodes import read_episode
 from test.episodes.planted import PUCK1, mcap_file
+from test.nodes.conftest import StartNode
 from test.nodes.episodes import TOPIC, pose
 from test.nodes.harness import LATCHED, NodeProcess, Probe, until
 
@@ -86,3 +88,21 @@ def test_discard_and_names(recorder: NodeProcess, probe: Probe, tmp_path: Path) 
     assert not probe.call(StopEpisode, "/recorder/stop_episode").success
     assert [path.name for path in tmp_path.rglob("*") if path.is_dir()] == ["bags"]
     assert recorder.stop() == 0
+
+
+def test_latched_topics_are_in_every_bag(start_node: StartNode, probe: Probe, tmp_path: Path) -> None:
+    """One publisher, and three that each say something once."""
+    topics = ["/robot_description", "/labels"]
+    start_node("recorder", directory=str(tmp_path / "bags"), topics=topics, min_free_mb=1)
+    said = [("/robot_description", "<robot/>"), ("/labels", "one"), ("/labels", "two"), ("/labels", "three")]
+    publishers = [probe.publisher(String, topic, LATCHED) for topic, _ in said]  # each is there as long as it is held
+    for publish, (_, text) in zip(publishers, said, strict=True):
+        publish(String(data=text))
+    reports = probe.listen(DiagnosticArray, "/diagnostics")
+    probe.wait_for(reports, lambda report: "has no publisher" not in report.status[0].message)
+    for _ in range(2):
+        bag = probe.call(StartEpisode, "/recorder/start_episode").bag
+        probe.call(StopEpisode, "/recorder/stop_episode")
+        with mcap_file(Path(bag)).open("rb") as file:
+            stored = [(channel.topic, message.data) for _, channel, message in make_reader(file).iter_messages(topics)]
+        assert sorted((topic, deserialize_message(data, String).data) for topic, data in stored) == sorted(said)
