@@ -160,7 +160,8 @@ def _episode(path: Path, content: _Content, cell: str, cell_hash: str) -> Episod
         raise BagError(f"recorded in another cell: expected '{cell}', found '{head.cell}'")
     if cell_hash and head.cell_hash and head.cell_hash != cell_hash:
         raise BagError(f"recorded in another '{cell}': expected configuration {cell_hash}, found {head.cell_hash}")
-    found = [_tracks(source, rows or content.latched.get(source, []), content) for source, rows in content.tracks.items()]
+    latched = content.latched
+    found = [_tracks(source, rows or latched.get(source, []), content) for source, rows in content.tracks.items()]
     tracks = tuple(track for (track, *_), _ in found)
     fired = _fired(content.shots, head)
     first_ns = min((int(track.stamp_ns[0]) for track in tracks), default=0)
