@@ -11,7 +11,8 @@ from importlib.metadata import version
 
 import numpy as np
 
-from compass_ros.calibration.causal_map import IDENTIFIED, causal_map_refined
+from compass_ros.calibration.causal_map import causal_map_refined
+from compass_ros.calibration.identifiability import IDENTIFIED
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.methods import compass_config, method
 from compass_ros.calibration.noise import Noise, measure_noise
@@ -213,6 +214,7 @@ def assemble(
         cancelled=estimate.stop_reason.startswith("cancelled"),
         warnings=found.warnings,
         unit=simulator.unit,
+        together=estimate.together,
     )
 
 

@@ -6,6 +6,7 @@ left of x, z up. Time is integer nanoseconds of the sensor's clock. Quaternions 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
@@ -23,6 +24,9 @@ Quantity = Literal["xy", "xyz", "pose", "joint"]
 m]."""
 
 QUANTITY_SIZE: Mapping[Quantity, int] = {"xy": 2, "xyz": 3, "pose": 7, "joint": 1}
+
+WRONG = 3.0
+"""Error bars from which a parameter has moved: of 64 right ones, one in six calibrations shows one by chance."""
 
 Channel = Literal["dynamics", "contact", "actuation", "sensing"]
 Phase = Literal["strike", "free", "wall_contact", "object_contact", "all"]
@@ -150,6 +154,22 @@ class Graph:
 
 
 @dataclass(frozen=True)
+class Together:
+    """Parameters of which the recordings tell a combination, and none alone."""
+
+    parameters: tuple[str, ...]
+    ratios: bool
+    """All may be larger by one factor: only their ratios show."""
+
+    @property
+    def sentence(self) -> str:
+        """`a : b : c show only as ratios`, without a full stop."""
+        if self.ratios:
+            return f"{' : '.join(self.parameters)} show only as ratios"
+        return f"{', '.join(self.parameters[:-1])} and {self.parameters[-1]} show only together"
+
+
+@dataclass(frozen=True)
 class Iteration:
     """State of a calibration after one iteration, for figures."""
 
@@ -180,6 +200,7 @@ class Estimate:
     converged: bool
     stop_reason: str
     """One sentence: why it stopped."""
+    together: tuple[Together, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -201,7 +222,18 @@ class ParameterRow:
     std: float
     bounds: tuple[float, float]
     active: bool
+    """It matters: it has an edge in the causal graph."""
     identifiable: bool
+
+    @property
+    def error_bars(self) -> float:
+        """How many of its standard deviations it moved; NaN for a method that gives none."""
+        return abs(self.value - self.default) / self.std if self.std > 0 else math.nan
+
+    @property
+    def wrong(self) -> bool:
+        """Whether its default was wrong: it moved by more than WRONG error bars."""
+        return self.error_bars > WRONG
 
 
 @dataclass(frozen=True)
@@ -312,3 +344,5 @@ class Result:
     warnings: Sequence[str] = ()
     unit: Unit = "m"
     """Of gap and noise floor."""
+    together: tuple[Together, ...] = ()
+    """Parameters that are told only together."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from statistics import fmean, stdev
 
 from compass_ros.bench.outcome import Row, case_of
-from compass_ros.calibration.causal_map import IDENTIFIED
+from compass_ros.calibration.identifiability import IDENTIFIED
 from compass_ros.cells import load
 from compass_ros.reporting.markdown import markdown_table
 

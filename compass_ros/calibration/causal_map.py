@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from compass_ros.calibration.identifiability import IDENTIFIED, together
 from compass_ros.calibration.least_squares import Point, start
 from compass_ros.calibration.problem import Allowance, Problem
 from compass_ros.calibration.refine import COARSE, Refined, refine, standard_errors
@@ -22,8 +23,6 @@ from compass_ros.types import Estimate, Floats, Graph, Iteration, Progress, Repo
 
 EDGE_SHARE = 0.003
 """Share of all change above which a parameter is a cause: the paper's sparsity weight, for standardised differences."""
-IDENTIFIED = 0.5
-"""A parameter is identified where the recordings shrink its prior width at least to this share."""
 
 
 def causal_map(problem: Problem, allowance: Allowance, seed: int, report: Report) -> Estimate:
@@ -62,16 +61,21 @@ def causal_map_refined(problem: Problem, report: Report) -> tuple[Estimate, Refi
 def to_estimate(problem: Problem, refined: Refined, trace: tuple[Iteration, ...]) -> Estimate:
     """The refined point with standard errors, identifiability and graph."""
     free, errors = standard_errors(refined)
+    values, parameters = refined.fit.point.values, problem.parameters
     std = problem.likelihood.prior_std.copy()
     std[free] = errors
-    identifiable = std < IDENTIFIED * problem.likelihood.prior_std
+    identifiable = np.zeros(len(std), bool)
+    identifiable[free] = refined.alone < IDENTIFIED
+    shared = together(
+        refined.covariance[: len(free), : len(free)], identifiable[free], values[free], [parameters[i] for i in free]
+    )
     graph = intervention_graph(problem, refined)
     floor = refined.chi_square < 1.2
     reason = f"chi-square {refined.chi_square:.2f}: " + (
         "the noise floor is reached" if floor else "above the noise floor, something else differs"
     )
-    values = refined.fit.point.values
-    return Estimate("causal-map", values, std, identifiable, graph, trace, trace[-1].rollouts, floor, reason)
+    spent = trace[-1].rollouts
+    return Estimate("causal-map", values, std, identifiable, graph, trace, spent, floor, reason, shared)
 
 
 def intervention_graph(problem: Problem, refined: Refined) -> Graph:

@@ -100,11 +100,13 @@ def _prior(likelihood: Likelihood, point: Point) -> float:
 def inward(likelihood: Likelihood, point: Point, which: Ints, steps: Floats) -> Floats:
     """(p,) changes of some parameters in their units, from steps in standard deviations of the prior.
 
-    A step that would leave the bounds is taken to the other side.
+    A step that would leave the bounds is taken to the other side; where both sides end too soon, to the farther bound.
     """
-    changes = steps * likelihood.prior_std[which]
-    there = point.values[which] + changes
-    return np.where((there > likelihood.high[which]) | (there < likelihood.low[which]), -changes, changes)
+    value, low, high = point.values[which], likelihood.low[which], likelihood.high[which]
+    ahead = steps * likelihood.prior_std[which]
+    fits, fits_back = ((value + step >= low) & (value + step <= high) for step in (ahead, -ahead))
+    farther = np.where(high - value >= value - low, high, low) - value
+    return np.where(fits, ahead, np.where(fits_back, -ahead, farther))
 
 
 def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats, onset: Floats | None = None) -> Linear:
@@ -126,8 +128,9 @@ def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats, o
     until = np.zeros((columns, episodes))
     if onset is not None:
         until[1 : 1 + len(free)] = np.maximum(onset.T - MARGIN_S, 0.0)
+    rows = len(index)
     flat, same = likelihood.residual_alike(
-        values.reshape(-1, values.shape[2]), inputs.reshape(-1, inputs.shape[2]), index, index, until.ravel()
+        values.reshape(rows, values.shape[2]), inputs.reshape(rows, inputs.shape[2]), index, index, until.ravel()
     )
     residual = flat.reshape(columns, episodes, *flat.shape[1:])
     scale = likelihood.prior_std[free] / steps

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compass_ros.types import Floats, Ints, Parameter
+from compass_ros.types import Bools, Floats, Ints, Parameter
 
 Predict = Callable[[Floats, Floats, Floats], Floats]
 """(B, P) values, (B, A) inputs, (B, F) times [s] -> (B, F, C) what the tracker would say: the door to a simulator."""
@@ -21,6 +21,10 @@ PredictAlike = Callable[[Floats, Floats, Floats, Ints, Floats], tuple[Floats, Fl
 
 Returned is also until when it really did (`Simulator.observe_alike`).
 """
+
+HOPELESS = 1e9
+"""Residual [sigma] of a prediction that is no number, or farther away than that: the square of this still adds up, and
+a simulator that has lost a body is never mistaken for one that agrees."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,11 @@ class Likelihood:
     @property
     def high(self) -> Floats:
         return np.array([p.high for p in self.parameters])
+
+    @property
+    def tunable(self) -> Bools:
+        """(P,) False where the bounds leave a parameter no room."""
+        return self.high > self.low
 
     @property
     def measurements(self) -> int:
@@ -97,4 +106,6 @@ class Likelihood:
         return self._missed(predicted, episode), same
 
     def _missed(self, predicted: Floats, episode: Ints) -> Floats:
-        return np.asarray(np.nan_to_num((predicted - self.measured[episode]) / self.sigma[episode]))
+        measured = self.measured[episode]
+        missed = np.nan_to_num((predicted - measured) / self.sigma[episode], nan=HOPELESS)
+        return np.where(np.isnan(measured), 0.0, np.clip(missed, -HOPELESS, HOPELESS))

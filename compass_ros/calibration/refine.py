@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from compass_ros.calibration.identifiability import WIDER, alone
 from compass_ros.calibration.least_squares import (
     Fit,
     Linear,
@@ -111,6 +112,8 @@ class Refined:
     """The one that was maximised at last: its sigma holds the simulator's roughness."""
     covariance: Floats
     """(n, n) of free parameters, then launches, in units of the prior's standard deviations."""
+    alone: Floats
+    """(p,) standard deviation of each free parameter if the others' priors were wider (`identifiability.alone`)."""
     chi_square: float
     """Mean squared residual over what noise alone would leave; 1 = the noise floor."""
     influence: Influence
@@ -163,11 +166,13 @@ def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True)
     fit = settled(rough, replace(fit, linear=linear, robust=ROBUST))
     watch("refine", 1.0, fit.point)
     spread = covariance(rough, fit)
+    own = alone(spread[: len(felt), : len(felt)])
     if many(likelihood):
-        factor = np.ones(len(spread))
-        factor[: len(felt)] = coupling(influence.gram, felt, information_share(rough, fit))
+        share, factor = information_share(rough, fit), np.ones(len(spread))
+        factor[: len(felt)] = coupling(influence.gram, felt, share)
         spread = spread * np.outer(factor, factor)
-    return Refined(fit, rough, spread, chi_square(rough, fit), influence)
+        own = own * coupling(influence.gram, felt, WIDER**2 * share)
+    return Refined(fit, rough, spread, own, chi_square(rough, fit), influence)
 
 
 def freed(
@@ -258,10 +263,10 @@ def sensitivity(likelihood: Likelihood, point: Point) -> Influence:
     count = len(likelihood.parameters)
     strength, steps, gram = np.zeros(count), np.ones(count), np.zeros((count, count))
     changes = np.zeros((*likelihood.measured.shape, count))
-    asked = np.flatnonzero(acting(likelihood, point, COARSE))
+    asked = np.flatnonzero(acting(likelihood, point, COARSE) & likelihood.tunable)
     coarse = linearise(likelihood, point, asked, np.full(len(asked), COARSE))
     strength[asked], steps[asked] = np.sqrt(np.sum(coarse.jacobian**2, axis=(0, 1, 2))), difference_steps(coarse)
-    columns = coarse.jacobian.reshape(-1, len(asked))
+    columns = coarse.jacobian.reshape(likelihood.measured.size, len(asked))
     gram[np.ix_(asked, asked)] = columns.T @ columns
     changes[..., asked] = coarse.jacobian * likelihood.sigma[..., None]
     onset = np.zeros((len(likelihood.inputs), count))

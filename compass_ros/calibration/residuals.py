@@ -17,9 +17,9 @@ def residual_at(likelihood: Likelihood, point: Point) -> Floats:
 
 
 def typical_residual(likelihood: Likelihood, point: Point) -> float:
-    """Median size of a residual [sigma], scaled to a standard deviation."""
-    residual = residual_at(likelihood, point)
-    return float(np.median(np.abs(residual[~np.isnan(likelihood.measured)]))) / 0.6745
+    """Median size of a residual [sigma], scaled to a standard deviation; zero where nothing was measured."""
+    seen = ~np.isnan(likelihood.measured)
+    return float(np.median(np.abs(residual_at(likelihood, point)[seen]))) / 0.6745 if seen.any() else 0.0
 
 
 def chi_square(likelihood: Likelihood, fit: Fit) -> float:

@@ -30,7 +30,7 @@ def along_valleys(likelihood: Likelihood, point: Point, linear: Linear, free: In
     The rest stays as it is (Broyden 1965, with a measured secant for each direction).
     """
     p = len(free)
-    jacobian = linear.jacobian.reshape(-1, p).copy()
+    jacobian = linear.jacobian.reshape(linear.residual.size, p).copy()
     weight = robust_weight(linear.residual, robust).reshape(-1, 1)
     launches = np.zeros(linear.launch_jacobian.shape[0] * linear.launch_jacobian.shape[-1])  # stay where they are
     asked = np.zeros((0, p))

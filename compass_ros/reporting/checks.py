@@ -15,6 +15,7 @@ from compass_ros.reporting.words import (
     best_model,
     fit_rmse,
     held_out_rmse,
+    told,
 )
 from compass_ros.types import ParameterRow, Result
 
@@ -57,6 +58,7 @@ def assess(result: Result) -> tuple[Check, ...]:
         *_improvement(result),
         *_carries_over(result),
         *_identifiable(result),
+        *_together(result),
         *_at_bounds(result),
         *_verdict(result),
         *_effects_predict(result),
@@ -140,12 +142,18 @@ def _identifiable(result: Result) -> Iterator[Check]:
         yield Check("good", "Parameters are identifiable", f"The recordings pin down all {len(active)} active ones.")
 
 
+def _together(result: Result) -> Iterator[Check]:
+    for group in result.together:
+        text = f"{group.sentence}. Keep one of them at a value that was measured, and the others follow."
+        yield Check("care", f"{len(group.parameters)} parameters told only together", text)
+
+
 def _at_bounds(result: Result) -> Iterator[Check]:
     stuck = []
     for row in result.parameters:
         low, high = row.bounds
         margin = BOUND_SHARE * (high - low)
-        if row.active and math.isfinite(margin) and not low + margin <= row.value <= high - margin:
+        if told(row) and math.isfinite(margin) and not low + margin <= row.value <= high - margin:
             stuck.append(row)
     if stuck:
         text = f"{_names(stuck)}. The true value may lie outside, or the parameter stands in for something else."

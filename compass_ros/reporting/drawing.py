@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from compass_ros.reporting.extras import ReportExtras, ResidualMap, Scene
-from compass_ros.reporting.words import MODEL_LABEL, MODELS
+from compass_ros.reporting.words import MODEL_LABEL, MODELS, told
 from compass_ros.types import Floats, Replay, ReplayedTrack, Result
 
 MAX_REPLAYS = 48
@@ -136,7 +136,7 @@ def _map(residual: ResidualMap | None) -> dict[str, Any] | None:
 
 
 def _iterations(result: Result, extras: ReportExtras) -> dict[str, Any]:
-    rows = [(i, row) for i, row in enumerate(result.parameters) if row.active]
+    rows = [(i, row) for i, row in enumerate(result.parameters) if told(row)]
     traced = [it for it in result.trace if it.values.size == len(result.parameters)]
     parameters = [
         {

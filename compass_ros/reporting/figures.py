@@ -18,7 +18,7 @@ from compass_ros.reporting.drawing import plane
 from compass_ros.reporting.extras import Scene, Shape
 from compass_ros.reporting.numbers import with_unit
 from compass_ros.reporting.palette import LIGHT
-from compass_ros.reporting.words import MODEL_LABEL, MODELS, Model, held_out_rmse
+from compass_ros.reporting.words import MODEL_LABEL, MODELS, Model, held_out_rmse, told
 from compass_ros.types import Floats, Graph, Replay, ReplayedTrack, Result
 
 STYLE: Mapping[str, Any] = {
@@ -127,14 +127,14 @@ def causal_graph(graph: Graph, rows: int = 24) -> Figure:
 
 
 def parameter_curves(result: Result, most: int = 12, truth: Mapping[str, float] | None = None) -> Figure:
-    """How the active parameters moved; dashed the default, dotted the truth, the band one standard deviation."""
+    """How what was wrong or matters moved; dashed the default, dotted the truth, the band one standard deviation."""
     known, traced = truth or {}, [it for it in result.trace if it.values.size == len(result.parameters)]
-    active = [(i, row) for i, row in enumerate(result.parameters) if row.active][:most]
-    columns, rollouts = min(3, max(len(active), 1)), [it.rollouts for it in traced]
+    shown = [(i, row) for i, row in enumerate(result.parameters) if told(row)][:most]
+    columns, rollouts = min(3, max(len(shown), 1)), [it.rollouts for it in traced]
     with styled():
-        figure = Figure(figsize=(2.5 * columns, 1.6 * max(math.ceil(len(active) / columns), 1)), layout="constrained")
-        for place, (i, row) in enumerate(active):
-            axes = figure.add_subplot(math.ceil(len(active) / columns), columns, place + 1)
+        figure = Figure(figsize=(2.5 * columns, 1.6 * max(math.ceil(len(shown) / columns), 1)), layout="constrained")
+        for place, (i, row) in enumerate(shown):
+            axes = figure.add_subplot(math.ceil(len(shown) / columns), columns, place + 1)
             axes.set_title(f"{row.name} [{row.unit}]" if row.unit not in ("", "1") else row.name, fontsize=7)
             if math.isfinite(row.std):
                 axes.axhspan(row.value - row.std, row.value + row.std, color=LIGHT["calibrated"], alpha=0.15, lw=0)

@@ -20,6 +20,7 @@ from compass_ros.types import (
     ParameterRow,
     Region,
     Result,
+    Together,
     Where,
 )
 
@@ -43,6 +44,7 @@ def from_json(content: Json) -> Result:
         noise_floor_m=_number(gap["noise_floor_m"]),
         unit=gap.get("unit", "m"),
         parameters=tuple(_parameter(row) for row in content["parameters"]),
+        together=tuple(Together(tuple(g["parameters"]), g["ratios"]) for g in content.get("together", ())),
         graph=Graph(
             tuple(graph["parameters"]),
             tuple(graph["factors"]),

@@ -15,7 +15,7 @@ from compass_ros.reporting.extras import ReportExtras, ResidualMap
 from compass_ros.reporting.figures import LINE, causal_graph, gap_bars, parameter_curves, save, styled, trajectories
 from compass_ros.reporting.palette import LIGHT
 from compass_ros.reporting.residuals import error_curves, judged, left_over
-from compass_ros.reporting.words import MODEL_LABEL, best_model
+from compass_ros.reporting.words import MODEL_LABEL, best_model, told
 from compass_ros.types import Region, Replay, Result
 
 
@@ -24,7 +24,7 @@ def write_figures(result: Result, extras: ReportExtras, folder: Path) -> tuple[P
     figures: dict[str, Figure] = {"gap": gap_bars(result)}
     if result.graph.psi.any():
         figures["causal_graph"] = causal_graph(result.graph)
-    if any(row.active for row in result.parameters) and result.trace:
+    if any(told(row) for row in result.parameters) and result.trace:
         figures["parameters"] = parameter_curves(result, truth=extras.truth)
     if result.replays:
         figures["error_over_time"] = error_over_time(result)

@@ -48,6 +48,7 @@ def _parameter(row: ParameterRow) -> dict[str, Any]:
         "bounds": [_number(bound) for bound in row.bounds],
         "active": bool(row.active),
         "identifiable": bool(row.identifiable),
+        "wrong": row.wrong,
     }
 
 
@@ -130,6 +131,7 @@ def to_json(result: Result) -> dict[str, Any]:
         "episodes": {"fit": list(result.fit), "held_out": list(result.held_out)},
         "gap": gap,
         "parameters": [_parameter(row) for row in result.parameters],
+        "together": [{"parameters": list(group.parameters), "ratios": group.ratios} for group in result.together],
         "graph": _graph(result.graph),
         "mismatch": _mismatch(result.mismatch),
     }

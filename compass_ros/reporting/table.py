@@ -21,8 +21,10 @@ from compass_ros.reporting.words import (
     Level,
     fit_rmse,
     held_out_rmse,
+    in_error_bars,
+    told,
 )
-from compass_ros.types import ParameterRow, Result
+from compass_ros.types import WRONG, ParameterRow, Result
 
 STYLE: Mapping[Level, str] = {"good": "bold green", "note": "dim", "care": "bold yellow", "bad": "bold red"}
 
@@ -32,7 +34,7 @@ NARROW: Mapping[str, Any] = {"box": box.MINIMAL_HEAVY_HEAD, "pad_edge": False, "
 
 
 def print_result(result: Result, truth: Mapping[str, float] | None = None, console: Console | None = None) -> None:
-    """Print the active parameters (with the truth where known), the gap, the checks that need attention, the verdict.
+    """Print the parameters that were wrong or matter, the gap, the checks that need attention, the verdict.
 
     Names are printed as they are: markup in them has no effect.
     """
@@ -57,27 +59,39 @@ def print_verdict(result: Result, out: Console) -> None:
 
 
 def parameter_table(result: Result, truth: Mapping[str, float]) -> Table:
-    """Active parameters and those whose truth differs from the default, in the order of the cell."""
-    shown = [row for row in result.parameters if row.active or truth.get(row.name, row.default) != row.default]
-    hidden = len(result.parameters) - len(shown)
-    caption = Text(f"{hidden} further parameters have no edge and keep their defaults" if hidden else "", "dim")
-    table = Table(caption=caption, caption_justify="left", **NARROW)
+    """What was wrong apart from what matters, each in the order of the cell; then what was missed, by the truth."""
+    parts = {
+        "wrong, with an edge": [row for row in result.parameters if row.wrong and row.active],
+        "wrong, without an edge": [row for row in result.parameters if row.wrong and not row.active],
+        "not moved, with an edge": [row for row in result.parameters if row.active and not row.wrong],
+        "missed": [r for r in result.parameters if not told(r) and truth.get(r.name, r.default) != r.default],
+    }
+    hidden = len(result.parameters) - sum(len(rows) for rows in parts.values())
+    caption = f"{hidden} further parameters have no edge" if hidden else ""
+    if in_error_bars(result):
+        caption += f" and moved by less than {WRONG:g} error bars" if hidden else ""
+    else:
+        parts = {"": parts["not moved, with an edge"], "missed": parts["missed"]}
+    table = Table(caption=Text(caption, "dim"), caption_justify="left", **NARROW)
     table.add_column("parameter", overflow="fold")
     table.add_column("default", justify="right")
     table.add_column("found", justify="right")
     if truth:
         table.add_column("truth", justify="right")
     table.add_column("unit")
-    for row in shown:
-        cells = [Text(row.name), Text(plain(row.default)), _found(row)]
-        if truth:
-            cells.append(Text(plain(truth[row.name]) if row.name in truth else MISSING))
-        table.add_row(*cells, Text(unit_text(row.unit)))
+    for heading, rows in parts.items():
+        if rows and heading:
+            table.add_row(Text(heading, "italic"))
+        for row in rows:
+            cells = [Text(row.name), Text(plain(row.default)), _found(row)]
+            if truth:
+                cells.append(Text(plain(truth[row.name]) if row.name in truth else MISSING))
+            table.add_row(*cells, Text(unit_text(row.unit)))
     return table
 
 
 def _found(row: ParameterRow) -> Text:
-    if not row.active:
+    if not told(row):
         return Text(f"{plain(row.value)} (no edge)", "dim")
     doubt = "" if row.identifiable else " ?"
     return Text(value_pm(row.value, row.std) + doubt, "bold" if row.identifiable else "dim")

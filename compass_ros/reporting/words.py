@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Literal
 
 from compass_ros.reporting.numbers import MINUS, with_unit
-from compass_ros.types import Phase, Result, Verdict, Where
+from compass_ros.types import ParameterRow, Phase, Result, Verdict, Where
 
 Level = Literal["good", "note", "care", "bad"]
 Model = Literal["nominal", "calibrated", "with_effects"]
@@ -64,6 +65,16 @@ CHANNEL: Mapping[str, str] = {
     "sensing": "sensing: from motion to measurement",
     "all": "no single channel",
 }
+
+
+def in_error_bars(result: Result) -> bool:
+    """Whether the method gives error bars, so that what was wrong can be told."""
+    return any(math.isfinite(row.error_bars) for row in result.parameters)
+
+
+def told(row: ParameterRow) -> bool:
+    """Whether a reader is shown this parameter: it was wrong, or it matters."""
+    return row.wrong or row.active
 
 
 def best_model(result: Result) -> Model:

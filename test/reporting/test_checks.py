@@ -9,7 +9,7 @@ from typing import get_args
 import pytest
 
 from compass_ros.reporting.checks import assess, overall
-from compass_ros.types import Gap, Result, Verdict
+from compass_ros.types import Gap, Result, Together, Verdict
 
 
 def titles(result: Result, *levels: str) -> list[str]:
@@ -90,6 +90,14 @@ def test_not_identifiable_parameters_are_named(clean: Result) -> None:
     found = [c for c in assess(replace(clean, parameters=(row, *clean.parameters[1:]))) if "identifiable" in c.title]
     assert found[0].level == "care"
     assert row.name in found[0].detail
+
+
+@pytest.mark.parametrize("ratios", [True, False])
+def test_what_shows_only_together_is_said(clean: Result, ratios: bool) -> None:
+    group = Together(("arm@dyna@mass", "arm@dyna@damping"), ratios)
+    found = [c for c in assess(replace(clean, together=(group,))) if "together" in c.title]
+    assert [c.level for c in found] == ["care"]
+    assert group.sentence in found[0].detail
 
 
 @pytest.mark.parametrize("verdict", get_args(Verdict))

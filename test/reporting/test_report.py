@@ -83,7 +83,7 @@ def test_says_what_it_must(outline: Outline, result: Result, extras: ReportExtra
     assert "2 of 10 active parameters not identifiable" in said
     assert "episode_0009: 4 frames without puck2" in said
     assert "0.8463 ± 0.0031" in said
-    assert "54 inactive parameters" in said
+    assert "54 further parameters" in said
     assert "within 12 cm of (0.020, −0.010) m" in said  # the sign that readers see
     for name in (*result.mismatch.undetectable, *(c.name for c in extras.candidates), *result.versions):
         assert name in said

@@ -104,6 +104,23 @@ def test_round_trip(tmp_path: Path, result: Result) -> None:
     assert [p.name for p in path.parent.iterdir()] == ["result.json"]
 
 
+@pytest.mark.parametrize(
+    ("value", "std", "wrong"),
+    [
+        (1.0, 0.1, False),
+        (1.31, 0.1, True),
+        (0.69, 0.1, True),
+        (1.29, 0.1, False),
+        (-2.0, 0.1, True),
+        (1.5, float("nan"), False),
+        (float("nan"), 0.1, False),
+    ],
+)
+def test_a_parameter_was_wrong_from_three_error_bars(result: Result, value: float, std: float, wrong: bool) -> None:
+    row = replace(result.parameters[0], default=1.0, value=value, std=std)
+    assert to_json(replace(result, parameters=(row,)))["parameters"][0]["wrong"] is wrong
+
+
 def test_same_result_same_bytes(tmp_path: Path, result: Result) -> None:
     versions, gap = reversed(list(result.versions.items())), reversed(list(result.gap.items()))
     shuffled = replace(result, versions=dict(versions), gap=dict(gap))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import get_args
 
@@ -11,7 +12,7 @@ import pytest
 from rich.console import Console
 
 from compass_ros.reporting import ReportExtras, print_result
-from compass_ros.types import Result, Verdict
+from compass_ros.types import Result, Together, Verdict
 
 
 def printed(result: Result, truth: dict[str, float] | None = None, width: int = 140) -> str:
@@ -59,6 +60,64 @@ def test_a_wrong_parameter_that_was_missed_is_shown(result: Result) -> None:
     name = "table@dyna@friction_sliding"
     assert name not in printed(result)
     assert line(printed(result, {name: 0.08}), name)[2:4] == ["0.05 (no edge)", "0.08"]
+
+
+def sections(text: str) -> dict[str, list[str]]:
+    """Names of the parameters under each heading."""
+    found: dict[str, list[str]] = {}
+    for row in text.splitlines():
+        name, *cells = [cell.strip() for cell in row.split("│")]
+        if len(cells) >= 3 and name and not any(cells):
+            found[name] = []
+        elif found and "@" in name and cells:
+            list(found.values())[-1].append(name)
+    return found
+
+
+KINDS = {
+    "wrong, with an edge": (4.0, True),
+    "wrong, without an edge": (-13.0, False),
+    "not moved, with an edge": (0.5, True),
+    "": (2.9, False),
+}
+"""Error bars by which a parameter has moved, and whether it has an edge."""
+
+
+def moved(result: Result, bars: Sequence[float], active: Sequence[bool], std: float) -> Result:
+    """The same with parameters that have moved so far; all others have not, and have no edge."""
+    rows = [replace(row, active=False, value=row.default, std=std) for row in result.parameters]
+    for i, (far, edge) in enumerate(zip(bars, active, strict=True)):
+        rows[i] = replace(rows[i], value=rows[i].default + far * std, active=edge)
+    return replace(result, parameters=tuple(rows))
+
+
+def test_what_was_wrong_is_shown_apart_from_what_matters(result: Result) -> None:
+    kinds = [name for name in KINDS for _ in range(2)]
+    bars, active = [KINDS[k][0] for k in kinds], [KINDS[k][1] for k in kinds]
+    text = printed(moved(result, bars, active, 1e-3))
+    for kind, names in sections(text).items():
+        assert names == [result.parameters[i].name for i, own in enumerate(kinds) if own == kind]
+    assert list(sections(text)) == [kind for kind in KINDS if kind]
+    assert "58 further parameters have no edge and moved by less than 3 error bars" in " ".join(text.split())
+
+
+@pytest.mark.parametrize("bars", [3.5, -3.5, 13.0, -200.0, 1e6])
+def test_no_parameter_that_moved_far_is_among_those_that_are_not_shown(result: Result, bars: float) -> None:
+    text = printed(moved(result, [bars], [False], 1e-4), width=80)
+    assert sections(text) == {"wrong, without an edge": [result.parameters[0].name]}
+
+
+def test_a_method_without_error_bars_says_nothing_of_them(result: Result) -> None:
+    text = printed(moved(result, [1.0, 1.0], [True, False], math.nan))
+    assert sections(text) == {}
+    assert result.parameters[0].name in text
+    said = " ".join(text.split())
+    assert "63 further parameters have no edge simulator" in said, "and then comes the next table"
+
+
+def test_what_shows_only_together_is_said(result: Result) -> None:
+    text = " ".join(printed(replace(result, together=(Together(("m", "d", "f"), ratios=True),))).split())
+    assert "3 parameters told only together. m : d : f show only as ratios." in text
 
 
 @pytest.mark.parametrize("verdict", get_args(Verdict))

@@ -9,7 +9,7 @@ from compass_ros.reporting.extras import ReportExtras
 from compass_ros.reporting.numbers import duration, typeset
 from compass_ros.reporting.view.gap import episodes, factor_table, ladder
 from compass_ros.reporting.view.missing import effect, ranking
-from compass_ros.reporting.view.parameters import active_rows, graph_rows, parameter
+from compass_ros.reporting.view.parameters import graph_rows, parameter, told_rows
 from compass_ros.reporting.words import (
     MODEL_LABEL,
     MODELS,
@@ -17,6 +17,8 @@ from compass_ros.reporting.words import (
     VERDICT_MEANING,
     VERDICT_TITLE,
     Level,
+    in_error_bars,
+    told,
     where_rows,
 )
 from compass_ros.types import Result
@@ -27,15 +29,18 @@ READING_ORDER: tuple[Level, ...] = ("bad", "care", "good", "note")
 
 def questions(result: Result) -> list[dict[str, Any]]:
     """The three questions of the suite with their short answers."""
-    active = active_rows(result)
-    firm = sum(row.identifiable for row in active)
+    active = [row for row in result.parameters if row.active]
+    wrong, firm = sum(row.wrong for row in result.parameters), sum(row.identifiable for row in active)
+    in_bars = in_error_bars(result)
     failed = VERDICT_LEVEL[result.mismatch.verdict] == "bad"
     names = [effect.name for effect in result.mismatch.effects]
     return [
         {
             "question": "Which parameters?",
-            "answer": f"{len(active)} of {len(result.parameters)}",
-            "detail": "have an edge in the causal graph",
+            "answer": f"{wrong if in_bars else len(active)} of {len(result.parameters)}",
+            "detail": f"were wrong; {len(active)} have an edge in the causal graph"
+            if in_bars
+            else "have an edge in the causal graph",
             "link": "causes",
         },
         {
@@ -66,8 +71,7 @@ def view(result: Result, extras: ReportExtras) -> dict[str, Any]:
     checks = sorted(assess(result), key=lambda check: READING_ORDER.index(check.level))
     level = overall(checks)
     mismatch = result.mismatch
-    active = active_rows(result)
-    inactive = [r for r in result.parameters if not r.active]
+    others = [r for r in result.parameters if not told(r)]
     return {
         "result": result,
         "sentence": typeset(mismatch.sentence),
@@ -80,8 +84,8 @@ def view(result: Result, extras: ReportExtras) -> dict[str, Any]:
         "models": [MODEL_LABEL[m] for m in MODELS],
         "episodes": episodes(result),
         "graph": graph_rows(result),
-        "active": [parameter(row, extras.truth.get(row.name)) for row in active],
-        "inactive": [parameter(row, extras.truth.get(row.name)) for row in inactive],
+        "told": [parameter(row, extras.truth.get(row.name)) for row in told_rows(result)],
+        "others": [parameter(row, extras.truth.get(row.name)) for row in others],
         "with_truth": bool(extras.truth),
         "meaning": VERDICT_MEANING[mismatch.verdict],
         "where": where_rows(mismatch.where) if mismatch.where is not None else (),

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from compass_ros.reporting.numbers import MINUS, percent, plain, unit_text, value_pm
+from compass_ros.reporting.numbers import MINUS, MISSING, percent, plain, unit_text, value_pm
+from compass_ros.reporting.words import told
 from compass_ros.types import ParameterRow, Result
 
 
@@ -24,9 +25,9 @@ def _moved(row: ParameterRow) -> float:
     return share if math.isfinite(share) else 0.0
 
 
-def active_rows(result: Result) -> list[ParameterRow]:
-    """Parameters with an edge, most moved first."""
-    return sorted((row for row in result.parameters if row.active), key=_moved, reverse=True)
+def told_rows(result: Result) -> list[ParameterRow]:
+    """Parameters that were wrong or have an edge: the wrong ones first, among each the most moved one."""
+    return sorted((row for row in result.parameters if told(row)), key=lambda r: (r.wrong, _moved(r)), reverse=True)
 
 
 def _strip(row: ParameterRow, truth: float | None) -> dict[str, Any]:
@@ -63,6 +64,8 @@ def parameter(row: ParameterRow, truth: float | None) -> dict[str, Any]:
         "low": plain(row.bounds[0]),
         "high": plain(row.bounds[1]),
         "change": f"{change * 100:+.0f} %".replace("-", MINUS) if math.isfinite(change) else "",
+        "wrong": f"yes, {row.error_bars:.0f} std" if row.wrong else "no" if math.isfinite(row.error_bars) else MISSING,
+        "matters": row.active,
         "identifiable": row.identifiable,
         "strip": _strip(row, truth),
     }
