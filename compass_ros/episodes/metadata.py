@@ -38,7 +38,6 @@ class BagSummary:
     duration_ns: int
     messages: int
     topics: tuple[TopicCount, ...]
-    compression: str = ""
 
 
 def record_text(summary: BagSummary) -> str:
@@ -69,7 +68,6 @@ def read_summary(folder: Path) -> BagSummary:
             duration_ns=int(information["duration"]["nanoseconds"]),
             messages=int(information["message_count"]),
             topics=tuple(_topic(entry) for entry in information["topics_with_message_count"]),
-            compression=_text(information.get("compression_mode") or "").lower().removeprefix("none"),
         )
     except OSError as error:
         raise BagError(f"{path}: cannot be read: {error.strerror}") from error

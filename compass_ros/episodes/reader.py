@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from compass_ros.episodes.bag import RawMessage, RawTopic, decode, is_bag, scan
+from compass_ros.episodes.bag import RawMessage, RawTopic, Remark, decode, is_bag, scan
 from compass_ros.episodes.definitions import EPISODE_TYPES, SHOT_TYPES, STRING_TYPE
 from compass_ros.episodes.measured import left_out, measured
 from compass_ros.episodes.notes import NOTES_TOPIC, SHOT_TOPIC, EpisodeHeader, Notes, Shot, header, notes, shot
@@ -55,7 +55,7 @@ def find_bags(paths: Iterable[str | Path]) -> tuple[Path, ...]:
     """
     found: dict[Path, Path] = {}
     for path in map(Path, paths):
-        bags = [path] if is_bag(path) or not path.is_dir() else sorted(filter(is_bag, path.iterdir()))
+        bags = [path] if is_bag(path) or not path.is_dir() else _bags_in(path)
         if not bags:
             raise BagError(f"{path}: no episodes: expected a bag or a folder of bags")
         for bag in bags:
@@ -63,6 +63,11 @@ def find_bags(paths: Iterable[str | Path]) -> tuple[Path, ...]:
     if not found:
         raise BagError("no episodes: expected at least one bag, found none")
     return tuple(found.values())
+
+
+def _bags_in(folder: Path) -> list[Path]:
+    """Hidden ones are none: macOS leaves `._x.mcap` beside x.mcap, and a recovery works in a hidden folder."""
+    return sorted(path for path in folder.iterdir() if is_bag(path) and not path.name.startswith("."))
 
 
 def read_episodes(
@@ -95,7 +100,9 @@ def read_bag(path: str | Path, sources: Sequence[Source], cell: str = "", cell_h
     content = _Content({source: [] for source in sources})
     for item in scan(path):
         _count(content.counts, item)
-        if isinstance(item, RawMessage):
+        if isinstance(item, Remark):
+            content.remarks.append(item.text)
+        elif isinstance(item, RawMessage):
             try:
                 content.take(item)
             except BagError as error:
@@ -119,6 +126,8 @@ class _Content:
         self.others: dict[Source, set[str]] = {}
         """Joints or frames of messages on a source's topic that do not hold it."""
         self.notes = Notes()
+        self.remarks: list[str] = []
+        """On the bag's files."""
         self._by_topic: dict[str, list[Source]] = {}
         self._types: dict[str, str] = {}
         for source in tracks:
@@ -175,7 +184,7 @@ def _episode(path: Path, content: _Content, cell: str, cell_hash: str) -> Episod
         initial_state=content.notes.initial_state,
         source=str(path),
         others=tuple(track for (_, *others), _ in found for track in others),
-        remarks=(*content.notes.remarks, *(remark for _, said in found for remark in said)),
+        remarks=(*content.remarks, *content.notes.remarks, *(remark for _, said in found for remark in said)),
     )
 
 
@@ -269,10 +278,10 @@ def _some(names: Sequence[str]) -> str:
     return f"{', '.join(names[:12])}{', ...' * (len(names) > 12)}"
 
 
-def _count(counts: dict[RawTopic, int], item: RawTopic | RawMessage) -> None:
+def _count(counts: dict[RawTopic, int], item: RawTopic | RawMessage | Remark) -> None:
     if isinstance(item, RawMessage):
         counts[item.topic] += 1
-    else:
+    elif isinstance(item, RawTopic):
         counts.setdefault(item, 0)
 
 

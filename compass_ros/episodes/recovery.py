@@ -5,21 +5,22 @@ from __future__ import annotations
 import fcntl
 import os
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mcap.records import Channel, Message, Schema
 
-from compass_ros.episodes import mcap_stream, metadata
-from compass_ros.episodes.bag import RawMessage, RawTopic, decode, scan
+from compass_ros.episodes import mcap_stream, metadata, packed
+from compass_ros.episodes.bag import RawMessage, RawTopic, bag_of, decode, scan, scan_file, storage_files
 from compass_ros.episodes.definitions import EPISODE_TYPE, EPISODE_TYPES, Definition, embedded_definition
 from compass_ros.episodes.notes import EPISODE_TOPIC, EpisodeHeader, header, header_bytes
 from compass_ros.episodes.writer import BagWriter, sync_bag
 from compass_ros.errors import BagError
 
-_WORK_FOLDER = ".recovering"
+_WORK_FOLDER = ".recovering_"
+"""Followed by the name of the file that is made whole in it."""
 
 
 @dataclass(frozen=True)
@@ -36,30 +37,34 @@ class Recovery:
 def recover(path: str | Path) -> Recovery:
     """Make a bag whole that has no end: keep every whole message before the cut, write the end and metadata.yaml.
 
-    The bag is replaced in one step, when its recovered copy is complete; a bag that is whole is left as it is. Works
-    for MCAP bags of one file, whoever recorded them.
+    A file is replaced in one step, when its recovered copy is complete; what is whole is left as it is. Works for MCAP
+    bags of one file or several, whoever recorded them, and for a bare .mcap file, which gets no metadata.yaml. Of a
+    sqlite3 bag only metadata.yaml can be missing.
 
     Raises:
-        BagError: No such bag, it is being recorded now, it holds no message, it is not MCAP, or the disk is full.
+        BagError: No such bag, it is being recorded now, it holds no message, it cannot be read, or the disk is full.
     """
-    folder = _folder(Path(path))
-    file = _mcap_file(folder)
-    with _locked(file):
-        whole = _messages_if_whole(folder)
-        if whole is not None:
-            return Recovery(folder, whole, was_whole=True)
-        work = folder / _WORK_FOLDER
+    bag = bag_of(Path(path))
+    files = _files(bag)
+    with ExitStack() as locks:
+        for file in files:
+            locks.enter_context(_locked(file))
+        counts = {file: _messages_if_whole(file) for file in files}
+        cut = [file for file, count in counts.items() if count is None]
+        described = bag.is_file() or (bag / metadata.FILE_NAME).exists()
+        if described and not cut and (whole := _messages_if_whole(bag)) is not None:
+            return Recovery(bag, whole, was_whole=True)
         try:
-            shutil.rmtree(work, ignore_errors=True)
-            kept = _rewrite(file, work)
-            sync_bag(work)
-            (work / file.name).replace(file)
-            (work / metadata.FILE_NAME).replace(folder / metadata.FILE_NAME)
+            _mend(cut, empty=not any(counts.values()))
+            summary = _summary(files)
+            if not summary.messages:
+                raise BagError(f"{bag}: holds no message; nothing to recover")
+            if bag.is_dir():
+                metadata.write_summary(bag, summary)
+                sync_bag(bag)
         except OSError as error:
-            raise BagError(f"{folder}: cannot be recovered: {error.strerror}") from error
-        finally:
-            shutil.rmtree(work, ignore_errors=True)
-    return Recovery(folder, kept, was_whole=False)
+            raise BagError(f"{bag}: cannot be recovered: {error.strerror}") from error
+    return Recovery(bag, summary.messages, was_whole=False)
 
 
 def unfinished(folder: Path) -> tuple[Path, ...]:
@@ -67,18 +72,54 @@ def unfinished(folder: Path) -> tuple[Path, ...]:
     return tuple(sorted(p for p in folder.glob("*") if any(p.glob("*.mcap")) and not (p / metadata.FILE_NAME).exists()))
 
 
-def _folder(path: Path) -> Path:
-    folder = path.parent if path.suffix == ".mcap" and path.is_file() else path
-    if not folder.is_dir():
-        raise BagError(f"{path}: no such bag")
-    return folder
+def _files(bag: Path) -> list[Path]:
+    """The files of a bag in the order of recording."""
+    if not bag.exists():
+        raise BagError(f"{bag}: no such bag")
+    if bag.is_file():
+        return [bag]
+    files = storage_files(bag) or sorted(bag.glob("*.mcap"))
+    if not files or (len(files) > 1 and not storage_files(bag)):
+        found = [file.name for file in files]
+        raise BagError(f"{bag}: expected one .mcap file to recover, or several named after the folder, found {found}")
+    return files
 
 
-def _mcap_file(folder: Path) -> Path:
-    files = sorted(folder.glob("*.mcap"))
-    if len(files) != 1:
-        raise BagError(f"{folder}: expected one .mcap file to recover, found {[file.name for file in files]}")
-    return files[0]
+def _mend(files: Sequence[Path], empty: bool) -> None:
+    """Give files their end, all or none; `empty`: the bag's other files hold no message.
+
+    Raises OSError, or BagError where one is not MCAP, or no message is left.
+    """
+    works = [file.parent / (_WORK_FOLDER + file.name) for file in files]
+    try:
+        for work in works:
+            shutil.rmtree(work, ignore_errors=True)
+        kept = [_rewrite(file, work) for file, work in zip(files, works, strict=True)]
+        if empty and files and not sum(kept):
+            raise BagError(f"{files[0]}: holds no whole message; nothing to recover")
+        for file, work in zip(files, works, strict=True):
+            sync_bag(work)
+            (work / file.name).replace(file)
+    finally:
+        for work in works:
+            shutil.rmtree(work, ignore_errors=True)
+
+
+def _summary(files: Sequence[Path]) -> metadata.BagSummary:
+    """What metadata.yaml says of whole files."""
+    counts: dict[RawTopic, int] = {}
+    stamps: list[int] = []
+    for item in (item for file in files for item in scan_file(file)):
+        if isinstance(item, RawTopic):
+            counts.setdefault(item, 0)
+        else:
+            counts[item.topic] += 1
+            stamps = [min(item.log_ns, *stamps), max(item.log_ns, *stamps)] if stamps else [item.log_ns] * 2
+    first, last = stamps or [0, 0]
+    storage = {".mcap": "mcap", ".db3": "sqlite3"}[packed.kind(files[0])]
+    topics = tuple(metadata.TopicCount(t.name, t.type, t.digest, count, t.qos) for t, count in counts.items())
+    names = tuple(file.name for file in files)
+    return metadata.BagSummary(storage, names, first, last - first, sum(counts.values()), topics)
 
 
 @contextmanager
@@ -97,20 +138,21 @@ def _locked(file: Path) -> Iterator[None]:
         os.close(descriptor)
 
 
-def _messages_if_whole(folder: Path) -> int | None:
+def _messages_if_whole(path: Path) -> int | None:
     try:
-        return sum(isinstance(item, RawMessage) for item in scan(folder))
+        items = scan_file(path) if path.is_file() else scan(path)
+        return sum(isinstance(item, RawMessage) for item in items)
     except BagError:
         return None
 
 
 def _rewrite(file: Path, work: Path) -> int:
     """Write every whole message of a file to a whole bag in the folder `work`; returns how many. Raises BagError."""
+    if file.suffix != ".mcap":
+        raise BagError(f"{file}: damaged; only .mcap files can be recovered")
     writer = BagWriter(work, file.name)
     try:
         last = _copy(file, writer)
-        if not writer.messages:
-            raise BagError(f"{file}: holds no whole message; nothing to recover")
         if last is not None and last.state == "recording":
             _say_recovered(writer, last)
         writer.close()

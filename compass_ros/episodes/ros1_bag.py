@@ -3,28 +3,39 @@
 from __future__ import annotations
 
 import bz2
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 
 import lz4.frame  # type: ignore[import-untyped]
-from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Reader, ReaderError
 from rosbags.rosbag1.reader import Chunk, IndexData, decompressors
+
+from compass_ros.episodes.raw import RawMessage, RawTopic, one_line
+from compass_ros.errors import BagError
 
 LARGEST_CHUNK = 256 * 2**20
 """A chunk that unpacks to more than this is refused [bytes]."""
 
 BROKEN = (
     *(ReaderError, AssertionError, ValueError, LookupError, EOFError),
-    *(RuntimeError, OverflowError, TypeError, MemoryError),
+    *(RuntimeError, OverflowError, TypeError, MemoryError, struct.error),
 )
 """What rosbags raises on a damaged ROS 1 bag."""
 
 
-def messages(path: Path) -> Iterator[tuple[Connection, int, bytes]]:
-    """(connection, log time [ns], bytes) of each message by log time. Raises one of `BROKEN`, or OSError."""
-    with _BoundedReader(path) as reader:
-        yield from reader.messages()
+def messages(path: Path) -> Iterator[RawTopic | RawMessage]:
+    """Topics and messages by log time. Raises BagError without the file's name, or OSError."""
+    topics: dict[int, RawTopic] = {}
+    try:
+        with _BoundedReader(path) as reader:
+            for connection, log_ns, data in reader.messages():
+                if connection.id not in topics:
+                    topics[connection.id] = RawTopic(connection.topic, connection.msgtype, connection.digest, ros1=True)
+                    yield topics[connection.id]
+                yield RawMessage(topics[connection.id], log_ns, data)
+    except BROKEN as error:
+        raise BagError(f"not a readable ROS 1 bag: {one_line(error)}") from error
 
 
 class _BoundedReader(Reader):

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
 from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys.store import Typestore
 
@@ -80,11 +82,18 @@ def messages(store: Typestore, frame: int) -> list[tuple[str, str, object]]:
     ]
 
 
-def write_rosbag2(folder: Path, storage: StoragePlugin) -> Path:
+def write_rosbag2(
+    folder: Path,
+    storage: StoragePlugin,
+    frames: Iterable[int] = range(FRAMES),
+    compression: CompressionMode = CompressionMode.NONE,
+) -> Path:
     store = typestore()
-    with Writer2(folder, version=9, storage_plugin=storage) as writer:
+    writer = Writer2(folder, version=9, storage_plugin=storage)
+    writer.set_compression(compression, CompressionFormat.ZSTD)
+    with writer:
         known: dict[str, Connection] = {}
-        for frame in range(FRAMES):
+        for frame in frames:
             for topic, kind, message in messages(store, frame):
                 if topic not in known:
                     known[topic] = writer.add_connection(topic, kind, typestore=store)
@@ -107,12 +116,47 @@ def write_ros1(path: Path, compression: Writer1.CompressionFormat | None = None)
     return path
 
 
+def write_ros1_mcap(path: Path, compression: CompressionType = CompressionType.ZSTD) -> Path:
+    """As `mcap convert old.bag new.mcap` writes it: the messages of ROS 1, and the names of their types."""
+    store = ros1_typestore()
+    with path.open("wb") as file:
+        writer = McapWriter(file, compression=compression)
+        writer.start(profile="ros1", library="mcap go")
+        known: dict[str, int] = {}
+        for frame in range(FRAMES):
+            for topic, kind, message in messages(store, frame):
+                if topic not in known:
+                    text, md5 = store.generate_msgdef(kind)
+                    schema = writer.register_schema(kind.replace("/msg/", "/"), "ros1msg", text.encode())
+                    metadata = {"callerid": "/other", "latching": "0", "md5sum": md5}
+                    known[topic] = writer.register_channel(topic, "ros1", schema, metadata)
+                data = bytes(store.serialize_ros1(message, kind))
+                writer.add_message(known[topic], STAMPS[frame], data, STAMPS[frame], frame)
+        writer.finish()  # type: ignore[no-untyped-call]
+    return path
+
+
 def all_bags(folder: Path) -> Sequence[Path]:
     """The same recording in every format."""
     return [
         write_rosbag2(folder / "mcap", StoragePlugin.MCAP),
         write_rosbag2(folder / "sqlite3", StoragePlugin.SQLITE3),
+        write_rosbag2(folder / "mcap_file", StoragePlugin.MCAP, compression=CompressionMode.FILE),
+        write_rosbag2(folder / "mcap_message", StoragePlugin.MCAP, compression=CompressionMode.MESSAGE),
+        write_rosbag2(folder / "mcap_storage", StoragePlugin.MCAP, compression=CompressionMode.STORAGE),
+        write_rosbag2(folder / "sqlite3_file", StoragePlugin.SQLITE3, compression=CompressionMode.FILE),
+        write_rosbag2(folder / "sqlite3_message", StoragePlugin.SQLITE3, compression=CompressionMode.MESSAGE),
         write_ros1(folder / "plain.bag"),
         write_ros1(folder / "bz2.bag", Writer1.CompressionFormat.BZ2),
         write_ros1(folder / "lz4.bag", Writer1.CompressionFormat.LZ4),
+        write_ros1_mcap(folder / "ros1_plain.mcap", CompressionType.NONE),
+        write_ros1_mcap(folder / "ros1_lz4.mcap", CompressionType.LZ4),
+        write_ros1_mcap(folder / "ros1_zstd.mcap", CompressionType.ZSTD),
     ]
+
+
+FORMATS = (
+    "mcap", "sqlite3", "mcap-file", "mcap-message", "mcap-storage", "sqlite3-file", "sqlite3-message",
+    "ros1", "ros1-bz2", "ros1-lz4", "ros1-in-mcap", "ros1-in-mcap-lz4", "ros1-in-mcap-zstd",
+)  # fmt: skip
+"""Of `all_bags`."""

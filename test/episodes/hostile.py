@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
 from compass_ros.episodes import BagContent, read_bag, recover, write_episode
 from compass_ros.episodes.sources import Source
 from compass_ros.errors import BagError
-from test.episodes.foreign import SOURCES, write_ros1, write_rosbag2
+from test.episodes.foreign import SOURCES, write_ros1, write_ros1_mcap, write_rosbag2
 from test.episodes.planted import ALL, episode
 
 LIES = [0, 1, 0xFF, 0x7FFFFFFF, 0xFFFFFFFF, 2**40, 2**63 - 1, 2**64 - 1]
@@ -32,13 +32,17 @@ def victims(folder: Path) -> list[Victim]:
     own = write_episode(episode(frames=8), folder)
     mcap = write_rosbag2(folder / "mcap", StoragePlugin.MCAP)
     sqlite = write_rosbag2(folder / "sqlite", StoragePlugin.SQLITE3)
+    packed = write_rosbag2(folder / "packed", StoragePlugin.MCAP, compression=CompressionMode.FILE)
     ros1 = write_ros1(folder / "ros1.bag")
+    converted = write_ros1_mcap(folder / "converted.mcap")
     files = [
         (own, own / "shot_0.mcap", ALL),
         (own, own / "metadata.yaml", ALL),
         (mcap, mcap / "mcap.mcap", SOURCES),
         (sqlite, sqlite / "sqlite.db3", SOURCES),
+        (packed, packed / "packed.mcap.zstd", SOURCES),
         (ros1, ros1, SOURCES),
+        (converted, converted, SOURCES),
     ]
     return [Victim(bag, file, file.read_bytes(), sources) for bag, file, sources in files]
 

@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
+import zstandard
 from mcap.writer import CompressionType, Writer
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
 from compass_ros.episodes import Source, find_bags, list_topics, read_bag, read_episode
 from compass_ros.episodes.definitions import POSE_TYPE, embedded_definition
 from compass_ros.errors import BagError
-from test.episodes.foreign import FRAMES, POSITION, SOURCES, STAMPS, TURN, all_bags, write_ros1, write_rosbag2
+from test.episodes.foreign import FORMATS, FRAMES, POSITION, SOURCES, STAMPS, TURN, all_bags, write_ros1, write_rosbag2
 from test.episodes.planted import pose_bytes
+
+
+class Usage(NamedTuple):
+    """As shutil.disk_usage gives it."""
+
+    total: int
+    used: int
+    free: int
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +33,7 @@ def bags(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return list(all_bags(tmp_path_factory.mktemp("foreign")))
 
 
-@pytest.mark.parametrize("index", range(5), ids=["mcap", "sqlite3", "ros1", "ros1-bz2", "ros1-lz4"])
+@pytest.mark.parametrize("index", range(len(FORMATS)), ids=FORMATS)
 def test_every_message_type_in_every_format(bags: list[Path], index: int) -> None:
     content = read_bag(bags[index], SOURCES, cell="theirs")
     found = content.episode
@@ -74,6 +85,87 @@ def test_a_bare_mcap_file_with_chunks(tmp_path: Path, compression: CompressionTy
         writer.finish()  # type: ignore[no-untyped-call]
     found = read_episode(path, [Source("/pose", "a")])
     assert found.tracks[0].value[:, 0].tolist() == list(range(100))
+
+
+@pytest.mark.parametrize(
+    "name", ["geometry_msgs/msg/PoseWithCovarianceStamped", "geometry_msgs/PoseWithCovarianceStamped"]
+)
+@pytest.mark.parametrize(("profile", "encoding"), [("ros2", "ros2msg"), ("", "ros2idl"), ("x", "")])
+def test_mcap_of_other_writers(tmp_path: Path, name: str, profile: str, encoding: str) -> None:
+    """Neither the profile nor how the definition is written decides: the messages are CDR of a type that is known."""
+    path = tmp_path / "theirs.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile=profile, library="other")
+        channel = writer.register_channel("/pose", "cdr", writer.register_schema(name, encoding, b""))
+        for frame in range(5):
+            writer.add_message(channel, frame, pose_bytes(STAMPS[0] + frame, x=frame), frame)
+        writer.finish()  # type: ignore[no-untyped-call]
+    assert read_episode(path, [Source("/pose", "a")]).tracks[0].value[:, 0].tolist() == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.parametrize("encoding", ["json", "protobuf", "flatbuffer", "msgpack", ""])
+def test_messages_that_are_not_of_ros(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "theirs.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channel = writer.register_channel("/pose", encoding, writer.register_schema(POSE_TYPE, "", b""))
+        writer.add_message(channel, 1, b"{}", 1)
+        writer.finish()  # type: ignore[no-untyped-call]
+    said = rf"/pose is a {POSE_TYPE} \({encoding or 'in no encoding'}\); expected one of"
+    with pytest.raises(BagError, match=said):
+        read_episode(path, [Source("/pose", "a")])
+    assert [topic.known for topic in list_topics(path)] == [False]
+
+
+@pytest.mark.parametrize("ending", [".zstd", ".zst"])
+@pytest.mark.parametrize("storage", [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_files_that_somebody_packed(tmp_path: Path, storage: StoragePlugin, ending: str) -> None:
+    """With the command `zstd`, in two frames; in the folder of their bag and outside."""
+    bag = write_rosbag2(tmp_path / "bag", storage)
+    (file,) = bag.glob("bag.*")
+    content, half = file.read_bytes(), file.stat().st_size // 2
+    packed = zstandard.compress(content[:half]) + zstandard.compress(content[half:])
+    file.unlink()
+    for path in (bag / (file.name + ending), tmp_path / (file.name + ending)):
+        path.write_bytes(packed)
+        np.testing.assert_array_equal(read_episode(path, SOURCES[2:3]).tracks[0].value, POSITION)
+    np.testing.assert_array_equal(read_episode(bag, SOURCES[2:3]).tracks[0].value, POSITION)
+    assert len(find_bags([tmp_path])) == 2
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lambda packed: packed[:-20], "truncated: packed with zstd"),
+        (lambda packed: b"", "truncated: packed with zstd"),
+        (lambda packed: b"x" + packed, "not packed with zstd, or damaged"),
+        (lambda packed: packed[:30] + bytes(40) + packed[70:], "not packed with zstd, or damaged|damaged:|truncated"),
+        (lambda packed: zstandard.compress(zstandard.decompress(packed)[:-100]), "truncated, the file has no end"),
+    ],
+)
+def test_packed_files_that_are_damaged(tmp_path: Path, damage: Callable[[bytes], bytes], said: str) -> None:
+    file = write_rosbag2(tmp_path / "bag", StoragePlugin.MCAP) / "bag.mcap"
+    path = tmp_path / "bag.mcap.zstd"
+    path.write_bytes(damage(zstandard.compress(file.read_bytes())))
+    with pytest.raises(BagError, match=said):
+        read_episode(path, SOURCES)
+
+
+def test_a_small_file_that_unpacks_to_very_much(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "bomb.mcap.zstd"
+    path.write_bytes(zstandard.compress(bytes(2**28)))
+    monkeypatch.setattr("shutil.disk_usage", lambda folder: Usage(0, 0, 2**27))
+    with pytest.raises(BagError, match="does not unpack into half of what is free"):
+        read_episode(path, SOURCES)
+
+
+def test_a_message_that_unpacks_to_very_much(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("compass_ros.episodes.packed.LARGEST_MESSAGE", 200)
+    bag = write_rosbag2(tmp_path / "bag", StoragePlugin.MCAP, compression=CompressionMode.MESSAGE)
+    with pytest.raises(BagError, match="a message unpacks to more than 200 bytes"):
+        read_episode(bag, SOURCES)
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.95, 0.999])

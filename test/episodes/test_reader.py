@@ -75,11 +75,6 @@ def test_a_file_that_is_no_mcap_is_not_called_cut_off(bag: Path, content: bytes)
     assert complaint(bag).endswith("shot_0.mcap: expected MCAP, found a file that does not begin as one")
 
 
-def test_without_metadata_it_says_how_to_recover(bag: Path) -> None:
-    (bag / "metadata.yaml").unlink()
-    assert f"run: compass record --recover {bag}" in complaint(bag)
-
-
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.3, 0.9, 0.999])
 def test_truncated_file(bag: Path, share: float) -> None:
     file = mcap_file(bag)

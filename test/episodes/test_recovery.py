@@ -146,8 +146,8 @@ def test_a_bag_that_is_being_recorded_is_left_alone(tmp_path: Path) -> None:
 def test_an_interrupted_recovery_can_be_repeated(tmp_path: Path) -> None:
     """Killed in the middle it leaves its work folder; killed between its two renames, a whole file without metadata."""
     bag, _ = cut_bag(tmp_path / "bag")
-    (bag / ".recovering").mkdir()
-    (bag / ".recovering" / "bag_0.mcap").write_bytes(b"half")
+    (bag / ".recovering_bag_0.mcap").mkdir()
+    (bag / ".recovering_bag_0.mcap" / "bag_0.mcap").write_bytes(b"half")
     assert recover(bag).messages == FRAMES + 2
     (bag / "metadata.yaml").unlink()
     assert recover(bag).messages == FRAMES + 2
