@@ -21,11 +21,12 @@ from compass_ros.calibration.refine import Refined, refine, with_launches
 from compass_ros.cells import Cell
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery, discover, not_evaluated
+from compass_ros.discovery.floor import honest
 from compass_ros.discovery.unseen import unexpected
 from compass_ros.errors import DataError
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.factors import factor_distance
-from compass_ros.simulation.replay import Recordings, Replay, positions, recordings
+from compass_ros.simulation.replay import Recordings, Replay, recordings, rms_distance
 from compass_ros.types import (
     Budget,
     Episode,
@@ -118,7 +119,7 @@ def pose(simulator: Simulator, data: Recordings, noise: Noise) -> Problem:
         inputs=simulator.inputs(data.inputs),
         time_s=data.time_s,
         measured=data.measured,
-        sigma=np.broadcast_to(noise.sigma, data.measured.shape).copy(),
+        sigma=noise.of(data.measured),
         correlation_time=noise.correlation_time,
         launch_std=simulator.launch_std(simulator.defaults),
         prior_mean=simulator.defaults,
@@ -128,7 +129,7 @@ def pose(simulator: Simulator, data: Recordings, noise: Noise) -> Problem:
         differences=replay.differences,
         trajectories=replay.predict,
         measured=np.nan_to_num(data.measured),
-        weight=np.where(np.isnan(data.measured), 0.0, 1 / noise.sigma),
+        weight=np.where(np.isnan(data.measured), 0.0, 1 / noise.of(data.measured)),
         actions=data.inputs,
         parameters=simulator.parameters,
         factors=tuple(f.name for f in cell.factors),
@@ -183,6 +184,7 @@ def assemble(
         name: {"fit": fit.gap(v)} | ({"held_out": unseen.gap(v)} if held_out else {})
         for name, (fit, unseen, v) in replays.items()
     }
+    floor = noise_floor(cell, found.noise or noise)
     graph = estimate.graph or Graph(
         tuple(p.name for p in cell.parameters),
         tuple(f.name for f in cell.factors),
@@ -205,10 +207,10 @@ def assemble(
         fit=data.names,
         held_out=judge.names if held_out else (),
         gap=gap,  # type: ignore[arg-type]  # keys are the literals by construction
-        noise_floor_m=noise_floor(cell, noise),
+        noise_floor_m=floor,
         parameters=rows,
         graph=graph,
-        mismatch=found.mismatch,
+        mismatch=honest(found.mismatch, gap["calibrated"]["held_out" if held_out else "fit"].rmse_m, floor),
         trace=estimate.trace,
         replays=drawn,
         cancelled=estimate.stop_reason.startswith("cancelled"),
@@ -230,8 +232,7 @@ def launched(simulator: Simulator, data: Recordings, noise: Noise, values: Float
 
 def noise_floor(cell: Cell, noise: Noise) -> float:
     """Root mean square distance that the noise alone leaves [m]: of positions, as in `Gap.rmse_m`."""
-    own = [list(columns) for columns in positions(cell).values()]
-    return float(np.sqrt(np.mean([np.sum(noise.sigma[columns] ** 2) for columns in own])))
+    return rms_distance(cell, noise.rms[None, None])
 
 
 def versions() -> dict[str, str]:

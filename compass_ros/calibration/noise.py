@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from compass_ros.calibration.encoder import ROOT_12, encoder_step, repeats
 from compass_ros.types import Bools, Floats
 
 MOST_CORRELATED = 0.98
@@ -15,8 +16,11 @@ _MIN_STILL = 5
 """Frames before the command that an episode needs to count as still."""
 _WORSE = 1.25
 """Flight noise over noise at rest from which motion counts as a source of noise (blur, stamps)."""
-_FINEST = 1e-5
-"""Least sigma [m]: a hundredth of a millimetre is what the simulator itself is smooth to (docs/simulation.md)."""
+LEAST_SHARE = 0.01
+"""Least sigma, as a share of the cell's `noise_m`: no recording is known better, and no simulator is smoother.
+
+Of 1 mm it is a hundredth of a millimetre, which is what the simulator is smooth to (docs/simulation.md).
+"""
 _WINDOW = 7
 """Frames of the local parabola that takes the motion out of a flight."""
 _OWN = 0.5
@@ -30,17 +34,38 @@ _ALIKE = 0.99
 
 @dataclass(frozen=True)
 class Noise:
-    """Measurement noise of the tracker."""
+    """Measurement noise of a sensor."""
 
     sigma: Floats
-    """(C,) standard deviation of one measurement [m or rad]."""
+    """(C,) standard deviation of one measurement, outliers drawn in [m or rad]; an encoder's rounding included."""
     correlation: float
     """Correlation of neighbouring frames, of an AR(1) process, 0 to below 1."""
+    step: Floats | None = None
+    """(C,) step of an encoder [m or rad], 0 where none was found; None: none anywhere."""
+    with_outliers: Floats | None = None
+    """(C,) root mean square of all that was seen of it, outliers as far away as they are; None: as `sigma`."""
+
+    @property
+    def rms(self) -> Floats:
+        """(C,) root mean square error of a measurement: what a simulator that is right leaves."""
+        return self.sigma if self.with_outliers is None else np.maximum(self.sigma, self.with_outliers)
 
     @property
     def correlation_time(self) -> float:
         """Frames that one independent measurement is worth."""
         return correlation_time(self.correlation)
+
+    def of(self, measured: Floats) -> Floats:
+        """(E, F, C) standard deviations of such measurements.
+
+        The rounding of an encoder that repeats a value is the same each time: all of them together are worth one, so in
+        a row of n its variance counts n times.
+        """
+        sigma = np.broadcast_to(self.sigma, measured.shape)
+        if self.step is None:
+            return sigma.copy()
+        again = repeats(measured, self.step) - 1
+        return np.asarray(np.where(again > 0, np.hypot(sigma, np.sqrt(again) * self.step / ROOT_12), sigma))
 
 
 def correlation_time(correlation: float) -> float:
@@ -94,20 +119,28 @@ def measure_noise(time_s: Floats, measured: Floats, expected: float, stated: Flo
     """From (E, F) times since the command and (E, F, C) measurements; `expected` [m] where neither can be measured.
 
     `stated`: (C,) what the sensor says of itself. It knows of errors that do not change from frame to frame, which no
-    scatter shows, so the larger of both counts.
+    scatter shows, so the larger of both counts; and so with an encoder's rounding, which stillness does not show.
     """
-    noise = _measured_noise(time_s, measured, expected)
-    return noise if stated is None else Noise(np.maximum(noise.sigma, stated), noise.correlation)
+    least = LEAST_SHARE * expected
+    step = np.array([encoder_step(list(column), ROOT_12 * least) for column in measured.transpose(2, 0, 1)])
+    sigma, beyond, correlation = _scatter(time_s, measured, expected, least)
+    with_outliers = np.hypot(sigma, beyond)
+    sigma = np.maximum(sigma, np.maximum(step / ROOT_12, least))
+    if stated is not None:
+        sigma = np.maximum(sigma, stated)
+    return Noise(sigma, correlation, step if step.any() else None, with_outliers)
 
 
-def _measured_noise(time_s: Floats, measured: Floats, expected: float) -> Noise:
+def _scatter(time_s: Floats, measured: Floats, expected: float, least: float) -> tuple[Floats, Floats, float]:
+    """(C,) standard deviation, (C,) rms of what is beyond the outliers' limit, correlation of neighbours."""
     still = _still_residuals(time_s, measured)
     if still is None:
-        flight, _ = _flight_noise(measured)
-        return Noise(np.where(np.isnan(flight), expected, flight), 0.0)
+        flight, beyond, _ = _flight_noise(measured)
+        return np.where(np.isnan(flight), expected, flight), beyond, 0.0
     at_rest, correlation = _at_rest(still)
     repeated = correlation_time(correlation)
-    flight, of_flight = _flight_noise(np.where(time_s[:, :, None] < 0, np.nan, measured))
+    flight, beyond, of_flight = _flight_noise(np.where(time_s[:, :, None] < 0, np.nan, measured))
+    beyond = np.fmax(beyond, np.sqrt(np.nanmean(np.square(still) - np.square(_clipped(still)), axis=(0, 1))))
     if correlation > _FOLLOWS:
         of_flight = np.zeros_like(of_flight)
     of_rest = (np.sum(~np.isnan(still), axis=(0, 1)) - len(still)) / repeated
@@ -115,7 +148,7 @@ def _measured_noise(time_s: Floats, measured: Floats, expected: float) -> Noise:
     moving_is_worse = np.nan_to_num(flight) > _WORSE * at_rest
     sigma = np.where(moving_is_worse, flight, both)
     freedom = np.where(moving_is_worse, np.maximum(of_flight, 1.0), of_rest + of_flight)
-    return Noise(_pooled(np.maximum(sigma, _FINEST), freedom), correlation)
+    return _pooled(np.maximum(sigma, least), freedom), beyond, correlation
 
 
 def _at_rest(still: Floats) -> tuple[Floats, float]:
@@ -162,8 +195,9 @@ def _clipped(still: Floats) -> Floats:
     return np.asarray(np.clip(still, -limit, limit))
 
 
-def _flight_noise(measured: Floats) -> tuple[Floats, Floats]:
-    """(C,) standard deviation by the middle of seven frames against the parabola through the others; (C,) its freedom.
+def _flight_noise(measured: Floats) -> tuple[Floats, Floats, Floats]:
+    """(C,) standard deviation by the middle of seven frames against the parabola through the others; (C,) the rms of
+    what is beyond the outliers' limit, (C,) the freedom of the first.
 
     Only the calmer half of the windows counts, by what the other six leave of their parabola: that keeps contacts out,
     and of a window's normal noise it says nothing about the middle. For white noise: correlated noise follows the
@@ -176,12 +210,12 @@ def _flight_noise(measured: Floats) -> tuple[Floats, Floats]:
     weights = np.linalg.pinv(design)[0]  # value of the parabola at the middle
     frames, columns = measured.shape[1] - 2 * half, measured.shape[2]
     if frames < 1:
-        return np.full(columns, np.nan), np.zeros(columns)
+        return np.full(columns, np.nan), np.zeros(columns), np.zeros(columns)
     windows = np.stack([measured[:, i : i + frames] for i in range(_WINDOW)], axis=-1)
     around = windows[..., others]
     deviation = windows[..., half] - around @ weights
     rough = np.sum((around - around @ (design @ np.linalg.pinv(design)).T) ** 2, axis=-1)
-    out, freedom = np.full(columns, np.nan), np.zeros(columns)
+    out, beyond, freedom = np.full(columns, np.nan), np.zeros(columns), np.zeros(columns)
     for c in range(columns):
         seen = ~np.isnan(rough[..., c]) & ~np.isnan(deviation[..., c])
         if not seen.any():
@@ -189,6 +223,8 @@ def _flight_noise(measured: Floats) -> tuple[Floats, Floats]:
         calm = seen & (rough[..., c] <= np.median(rough[..., c][seen]))
         chosen = deviation[..., c][calm]
         limit = 3.5 * 1.4826 * np.median(np.abs(chosen))
-        out[c] = np.sqrt(np.mean(np.clip(chosen, -limit, limit) ** 2) / (1 + np.sum(weights**2)))
+        drawn_in = np.clip(chosen, -limit, limit)
+        out[c] = np.sqrt(np.mean(drawn_in**2) / (1 + np.sum(weights**2)))
+        beyond[c] = np.sqrt(np.mean(chosen**2 - drawn_in**2))  # the middle's own: the others were found to be calm
         freedom[c] = len(chosen) * _OWN
-    return out, freedom
+    return out, beyond, freedom

@@ -64,7 +64,7 @@ def discover(
     found = Finding(simulator, space, refined, judge, noise, null, plan.undetectable, before, seed, warnings)
     unseen = held_out(judge, space.likelihood, space.fit)
     if not noticed(space, scores, null, noise, unseen):
-        return found.none(scores)
+        return found.none(scores, unseen)
     excess = 0.5 * smooth_excess(space.likelihood, space.fit.point, space.fit.robust) * space.likelihood.measurements
     cause = numerical_cause(space, max(excess, scores[0].gain if scores else 0.0))
     if cause:
@@ -77,7 +77,7 @@ def discover(
         found = replace(found, space=space, refined=again, null=simulate_null(space, scores, noise, seed))
         unseen = held_out(judge, space.likelihood, space.fit)
         if not noticed(space, scores, found.null, noise, unseen):
-            return found.none(scores)
+            return found.none(scores, unseen)
         choice = choose(space, scores, asked, unseen)
     tell("weigh effects", 0.9)
     return found.judged(choice, unseen)

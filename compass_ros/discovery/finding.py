@@ -13,6 +13,7 @@ from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import Refined, with_launches
 from compass_ros.calibration.residuals import covariance, jackknife
 from compass_ros.discovery.choice import Choice
+from compass_ros.discovery.floor import EVERYWHERE, UNEXPLAINED, left_over, shown_noise
 from compass_ros.discovery.formula import Proposal, propose
 from compass_ros.discovery.joint import Joint, from_second_start
 from compass_ros.discovery.maps import TableMap, residual_map
@@ -25,6 +26,7 @@ from compass_ros.discovery.unknown import whereabouts
 from compass_ros.discovery.unseen import HeldOut
 from compass_ros.discovery.words import errors, place, value_of, where_of
 from compass_ros.simulation import Simulator
+from compass_ros.simulation.replay import rms_distance
 from compass_ros.types import EffectFinding, EffectParameter, Evidence, Floats, Mismatch, Verdict
 
 
@@ -60,6 +62,8 @@ class Discovery:
     warnings: Sequence[str] = ()
     untaught: bool = False
     """What leaves nothing of the fitted episodes does not predict the others: they have what no fitted one shows."""
+    noise: Noise | None = None
+    """With what the fit has shown of it, where that is more than the recordings alone did."""
 
 
 def not_evaluated(reason: str) -> Discovery:
@@ -82,19 +86,20 @@ class Finding:
     seed: int
     warnings: tuple[str, ...]
 
-    def none(self, scores: Sequence[Score]) -> Discovery:
-        """The noise explains everything."""
-        unit = f"m{self.simulator.unit}"
-        sentence = (
-            f"Nothing is missing that these recordings could show: held-out error {1e3 * self._before:.2f} {unit}, "
-            f"noise {1e3 * self._floor():.2f} {unit}."
-        )
+    def none(self, scores: Sequence[Score], unseen: HeldOut) -> Discovery:
+        """No effect stands out: the noise explains everything, or these recordings cannot say what does."""
+        noise, unit = self.noise, f"m{self.simulator.unit}"
+        if left_over(self._before, self._floor(noise), True) != "none":
+            noise = shown_noise(noise, self.space.likelihood, self.space.fit)
+        verdict = left_over(self._before, self._floor(noise), unseen.excess > unseen.seen)
+        numbers = f"held-out error {1e3 * self._before:.2f} {unit}, noise {1e3 * self._floor(noise):.2f} {unit}"
         tried = tuple(
             Tried(s.candidate.name, s.candidate.attached.effect.channel, s.gain, 0.0, False, "within the noise")
             for s in scores[:8]
         )
-        mismatch = Mismatch("none", None, (), self.undetectable, "", sentence)
-        return Discovery(mismatch, tried=tried, before=self.before, warnings=self.warnings)
+        where = EVERYWHERE if verdict == "unknown" else None
+        mismatch = Mismatch(verdict, where, (), self.undetectable, "", f"{UNEXPLAINED[verdict]}: {numbers}.")
+        return Discovery(mismatch, tried=tried, before=self.before, warnings=self.warnings, noise=noise)
 
     def failed(self, sentence: str) -> Discovery:
         """Something is left, and it is no evidence of physics."""
@@ -179,12 +184,10 @@ class Finding:
         judged = likelihood.on(self.judge)
         inputs = judged.inputs + with_launches(judged, values).launch
         missed = judged.predict(np.tile(values, (len(inputs), 1)), inputs, judged.time_s) - judged.measured
-        objects = max(len(self.simulator.cell.objects), 1)
-        return float(np.sqrt(np.nanmean(missed**2) * missed.shape[2] / objects))
+        return rms_distance(self.simulator.cell, missed)
 
-    def _floor(self) -> float:
-        objects = max(len(self.simulator.cell.objects), 1)
-        return float(np.sqrt(np.sum(self.noise.sigma**2) / objects))
+    def _floor(self, noise: Noise) -> float:
+        return rms_distance(self.simulator.cell, noise.rms[None, None])
 
     @cached_property
     def _before(self) -> float:
@@ -193,10 +196,10 @@ class Finding:
 
     def _errors(self, joint: Joint) -> str:
         after = self._held_out(joint.likelihood, joint.fit.point.values)
-        return errors(self._before, after, self._floor(), self.simulator.unit)
+        return errors(self._before, after, self._floor(self.noise), self.simulator.unit)
 
     def _gain(self, joint: Joint) -> float:
-        after, floor = self._held_out(joint.likelihood, joint.fit.point.values), self._floor()
+        after, floor = self._held_out(joint.likelihood, joint.fit.point.values), self._floor(self.noise)
         return float(np.clip((self._before - after) / max(self._before - floor, 1e-9), -1.0, 1.0))
 
     def _evidence(self, joint: Joint, choice: Choice) -> Evidence:

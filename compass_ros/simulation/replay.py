@@ -140,11 +140,16 @@ class Replay:
         episodes = np.arange(len(self.data.names))
         tiled = np.tile(values, (len(episodes), 1))
         d = self.differences(tiled, episodes).mean(axis=0)
-        squared = (self.predict(tiled, episodes) - self.data.measured) ** 2
-        own = positions(self.simulator.cell).values()
-        distance2 = np.concatenate([squared[:, :, list(columns)].sum(axis=2).ravel() for columns in own])
+        missed = self.predict(tiled, episodes) - self.data.measured
         names = [f.name for f in self.simulator.cell.factors]
-        return Gap(dict(zip(names, d.tolist(), strict=True)), float(np.sqrt(np.nanmean(distance2))))
+        return Gap(dict(zip(names, d.tolist(), strict=True)), rms_distance(self.simulator.cell, missed))
+
+
+def rms_distance(cell: Cell, missed: Floats) -> float:
+    """Root mean square distance of positions over all frames and objects, for (E, F, C) differences, NaN where none."""
+    own = [list(columns) for columns in positions(cell).values()]
+    distance2 = np.concatenate([np.sum(missed[:, :, columns] ** 2, axis=2).ravel() for columns in own])
+    return float(np.sqrt(np.nanmean(distance2)))
 
 
 def positions(cell: Cell) -> dict[str, range]:

@@ -30,7 +30,7 @@ def recording(sigma: Floats, correlation: float = 0.0, still: int = STILL, seed:
 @pytest.mark.parametrize("correlation", [0.0, 0.4, 0.7])
 def test_sigma_and_correlation_are_found_from_still_frames(correlation: float) -> None:
     sigma = np.array([0.5e-3, 1e-3, 0.5e-3, 2e-3])
-    found = measure_noise(*recording(sigma, correlation), expected=9.0)
+    found = measure_noise(*recording(sigma, correlation), expected=0.02)
     np.testing.assert_allclose(found.sigma, sigma, rtol=0.12)
     assert found.correlation == pytest.approx(correlation, abs=0.06)
     assert found.correlation_time == pytest.approx((1 + correlation) / (1 - correlation), rel=0.25)
@@ -38,7 +38,7 @@ def test_sigma_and_correlation_are_found_from_still_frames(correlation: float) -
 
 def test_without_still_frames_the_flight_says_it() -> None:
     sigma = np.array([1e-3, 3e-3])
-    found = measure_noise(*recording(sigma, still=0), expected=9.0)
+    found = measure_noise(*recording(sigma, still=0), expected=0.02)
     np.testing.assert_allclose(found.sigma, sigma, rtol=0.1)
 
 
@@ -54,7 +54,7 @@ def test_outliers_and_gaps_hardly_matter() -> None:
     rng = np.random.default_rng(1)
     measured[rng.random(measured.shape) < 0.007] += 0.008
     measured[rng.random(measured.shape[:2]) < 0.05] = np.nan
-    found = measure_noise(time, measured, expected=9.0)
+    found = measure_noise(time, measured, expected=0.02)
     np.testing.assert_allclose(found.sigma, 1e-3, rtol=0.15)
     assert found.correlation == pytest.approx(0.4, abs=0.12)
 
@@ -62,17 +62,17 @@ def test_outliers_and_gaps_hardly_matter() -> None:
 def test_a_tracker_that_is_worse_in_motion_is_judged_in_motion() -> None:
     time, measured = recording(np.array([0.3e-3]))
     measured[:, STILL:] += np.random.default_rng(2).normal(0, 2e-3, (EPISODES, MOVING, 1))
-    found = measure_noise(time, measured, expected=9.0).sigma[0]
+    found = measure_noise(time, measured, expected=0.02).sigma[0]
     assert 0.9e-3 < found < 2.2e-3  # a median over all frames, of which a third are still
 
 
 def test_perfect_recordings_keep_sigma_positive() -> None:
-    assert (measure_noise(*recording(np.zeros(2)), expected=9.0).sigma > 0).all()
+    assert (measure_noise(*recording(np.zeros(2)), expected=0.02).sigma > 0).all()
 
 
 def test_columns_that_are_alike_are_judged_together() -> None:
     """Eight still frames a shot: 84 measurements a column say sigma to 8 %, all columns in rest and flight to 2 %."""
-    found = [measure_noise(*recording(np.full(4, 1e-3), still=8, seed=seed), expected=9.0).sigma for seed in range(10)]
+    found = [measure_noise(*recording(np.full(4, 1e-3), still=8, seed=seed), expected=0.02).sigma for seed in range(10)]
     assert np.ptp(found, axis=1).max() == 0
     assert np.std(found) < 0.03e-3
     assert np.mean(found) == pytest.approx(1e-3, rel=0.015)

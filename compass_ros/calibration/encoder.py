@@ -1,0 +1,100 @@
+"""Encoders that count: the step between the values that they can say, and what a value is worth that is said again.
+
+A value y = q round(x / q) is off by up to half a step q. Where x moves by a step or more from frame to frame, that is
+white noise of variance q^2 / 12 (Bennett 1948). Where x moves less it is not: while one value is repeated, all that is
+known is that x lies within one step, so n equal values in a row are worth one measurement and not n.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from compass_ros.types import Floats
+
+ROOT_12 = float(np.sqrt(12.0))
+"""Step over standard deviation of what rounding makes wrong: that of a uniform distribution."""
+_FEWEST = 20
+"""Changes from which a common spacing is found: by chance, their phases agree as below with probability exp(-16)."""
+_IN_PHASE = 0.9
+"""Mean cosine of the phases of differences on a lattice of this step; 0 +- 1 / sqrt(2 n) where there is none.
+
+Rayleigh's test (1919) gives exp(-n R^2) for n phases by chance. It leaves room for a rounding of 0.07 steps, as tables
+with few digits have it.
+"""
+_DIVISORS = (1, 2, 3, 4)
+"""The smallest difference that occurs may be so many steps."""
+_BELOW = 0.02
+"""Share of the differences that may be smaller than half a step: a lost digit, a glitch."""
+_GROWTH = 4.0
+"""By how much the range of differences grows from one refinement of the step to the next."""
+
+
+def encoder_step(series: Sequence[Floats], finest: float) -> float:
+    """The greatest common spacing of the values of one signal, 0 where there is none of `finest` or more.
+
+    Args:
+        series: (F,) values of each recording, NaN where nothing was seen. Any unit.
+        finest: The least step that is looked for [the same unit].
+    """
+    seen = [one[~np.isnan(one)] for one in series]
+    change = np.abs(np.concatenate([np.diff(one) for one in seen] or [np.zeros(0)]))
+    moved = np.sort(change[change > 0.1 * finest])
+    if len(moved) < _FEWEST:
+        return 0.0
+    least = moved[int(_BELOW * len(moved))]
+    smallest = float(np.median(moved[(moved >= least) & (moved <= 1.2 * least)]))
+    for divisor in _DIVISORS:
+        step = _lattice(moved, smallest / divisor) if smallest / divisor >= finest else 0.0
+        if step >= finest and _rough(seen, step):
+            return step
+    return 0.0
+
+
+def _lattice(moved: Floats, guess: float) -> float:
+    """The step near a guess of which all (n,) differences are multiples; 0 where they are not.
+
+    Small multiples say it roughly, and so let larger ones be counted, which say it better.
+    """
+    step, reach = guess, _GROWTH * guess
+    if np.mean(moved < 0.5 * guess) > _BELOW:
+        return 0.0
+    while True:
+        near = moved[moved <= reach]
+        count = np.round(near / step)
+        step = float(np.sum(count * near) / max(float(np.sum(count**2)), 1.0))
+        if step <= 0 or np.mean(np.cos(2 * np.pi * near / step)) < _IN_PHASE:
+            return 0.0
+        if reach >= moved[-1]:
+            return step
+        reach *= _GROWTH
+
+
+def _rough(seen: Sequence[Floats], step: float) -> bool:
+    """Whether the values jump as counts do: a fall computed without noise is on a lattice too, and is smooth.
+
+    Fourth differences of counts that change are a step or more, those of a smooth motion next to nothing.
+    """
+    fourth, moving = [], []
+    for one in seen:
+        if len(one) >= 5:
+            fourth.append(np.abs(np.diff(one, 4)))
+            moving.append(np.ptp(np.lib.stride_tricks.sliding_window_view(one, 5), axis=1) > 0.5 * step)
+    changing = np.concatenate(fourth)[np.concatenate(moving)] if fourth else np.zeros(0)
+    return bool(len(changing)) and float(np.median(changing)) > 0.5 * step
+
+
+def repeats(values: Floats, step: Floats) -> Floats:
+    """(E, F, C) how many equal values in a row each of (E, F, C) values is one of; 1 in columns without a (C,) step.
+
+    Frames in which nothing was seen (NaN) do not end such a row.
+    """
+    out = np.ones(values.shape)
+    for c in np.flatnonzero(step > 0):
+        for e in range(len(values)):
+            seen = np.flatnonzero(~np.isnan(values[e, :, c]))
+            said = values[e, seen, c]
+            row = np.concatenate([[0], np.cumsum(np.abs(np.diff(said)) > 0.5 * step[c])]) if len(said) else said
+            out[e, seen, c] = np.bincount(row.astype(int))[row.astype(int)] if len(said) else out[e, seen, c]
+    return out

@@ -1,0 +1,74 @@
+"""What is left is called noise only where episodes that were never fitted say so too."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from compass_ros.calibration.least_squares import Fit, Linear, start
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.noise import Noise
+from compass_ros.discovery.floor import TWICE, honest, left_over, shown_noise
+from compass_ros.types import Floats, Mismatch, Verdict
+from test.discovery.test_remainder import COLUMNS, EPISODES, FRAMES, ROBUST, recordings, white
+
+KNOWN = Noise(np.ones(COLUMNS), 0.0)
+
+
+def shown(given: Likelihood, noise: Noise = KNOWN) -> Floats:
+    nothing = Linear(np.zeros_like(given.measured), *(np.zeros(0),) * 3)
+    fit = Fit(start(given, np.zeros(0)), nothing, np.zeros(0, np.int64), ROBUST, 0, True)
+    return shown_noise(noise, given, fit).rms
+
+
+def test_what_follows_the_motion_is_no_noise() -> None:
+    np.testing.assert_allclose(shown(recordings(white(0), 1.5, 1.0)), 1.0, rtol=0.05)
+
+
+def test_outliers_blur_and_lost_frames_are() -> None:
+    """Five kinds of what changes from frame to frame, each with the rms that it was made with."""
+    rng = np.random.default_rng(3)
+    far = white(0) + 20.0 * (rng.random((EPISODES, FRAMES, COLUMNS)) < 0.01)
+    one_column = white(0) * np.array([1.0, 3.0, 1.0, 1.0])
+    kinds = {
+        "outliers": (far, None),
+        "louder": (2.5 * white(0), 2.5),
+        "one column": (one_column, [1, 3, 1, 1]),
+        "steps": (np.round(white(0) / 5) * 5 + rng.uniform(-2.5, 2.5, white(0).shape), None),
+        "heavy tails": (rng.standard_t(3, white(0).shape) * 1.5, None),
+    }
+    for name, (noise, expected) in kinds.items():
+        rms = np.sqrt(np.mean(np.square(noise), axis=(0, 1))) if expected is None else expected
+        np.testing.assert_allclose(shown(recordings(noise, 1.0, 1.0)), rms, rtol=0.12, err_msg=name)
+
+
+def test_what_is_not_seen_says_nothing() -> None:
+    given = recordings(3.0 * white(0), 0.0, 1.0)
+    gone = np.random.default_rng(2).random((EPISODES, FRAMES)) < 0.3
+    holes = replace(given, measured=np.where(gone[:, :, None], np.nan, given.measured))
+    np.testing.assert_allclose(shown(holes), 3.0, rtol=0.1)
+
+
+@pytest.mark.parametrize(
+    ("error", "surprising", "verdict"),
+    [
+        (1.0, True, "none"),
+        (1.99, False, "none"),
+        (2.0, True, "unknown"),
+        (2.0, False, "fit_failed"),
+        (1e9, True, "unknown"),
+    ],
+)
+def test_an_error_of_twice_the_floor_is_never_noise(error: float, surprising: bool, verdict: Verdict) -> None:
+    assert left_over(1e-3 * error, 1e-3, surprising) == verdict
+
+
+@pytest.mark.parametrize("verdict", get_args(Verdict))
+@pytest.mark.parametrize("error", [0.5, 1.9, 2.0, 1e9, float("inf")])
+def test_no_published_answer_says_none_beside_such_an_error(verdict: Verdict, error: float) -> None:
+    said = honest(Mismatch(verdict, None, (), (), "", "as it was"), error, 1.0)
+    assert (said.verdict == "none") == (verdict == "none" and error < TWICE)
+    assert said.verdict == verdict or (verdict, said.verdict) == ("none", "unknown")
