@@ -39,7 +39,7 @@ def encoder_step(series: Sequence[Floats], finest: float) -> float:
         finest: The least step that is looked for [the same unit].
     """
     seen = [one[~np.isnan(one)] for one in series]
-    change = np.abs(np.concatenate([np.diff(one) for one in seen] or [np.zeros(0)]))
+    change = np.abs(np.concatenate([np.diff(one, 2) for one in seen] or [np.zeros(0)]))  # small where it is fast too
     moved = np.sort(change[change > 0.1 * finest])
     if len(moved) < _FEWEST:
         return 0.0
