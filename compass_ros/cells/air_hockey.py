@@ -9,6 +9,7 @@ import numpy as np
 
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.dynamics import Sliding
+from compass_ros.cells.keyframe import begun, first_state
 from compass_ros.errors import ConfigError, nearest
 from compass_ros.types import Floats, Ints
 
@@ -51,6 +52,7 @@ class AirHockey:
         self._model.geom_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
         self._partners = np.stack([self._model.pair_geom1, self._model.pair_geom2])  # (2, npair)
         self._rest = {name: self._model.body(name).pos[:2].copy() for name in _MOVING}
+        self._first = first_state(begun(self._model), self._model)
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -107,6 +109,10 @@ class AirHockey:
         for geom in set(self._partners.ravel().tolist()):
             of_geom[:, geom] = values[:, self._cell.index(f"{self._model.geom(geom).name}@dyna@{parameter}")]
         return np.asarray(0.5 * (of_geom[:, self._partners[0]] + of_geom[:, self._partners[1]]))
+
+    @property
+    def first(self) -> Floats:
+        return self._first
 
     def start(self, values: Floats, inputs: Floats) -> tuple[Floats, Floats]:
         positions = np.zeros((len(values), self._model.nq))

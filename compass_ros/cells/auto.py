@@ -26,7 +26,11 @@ from compass_ros.types import Floats
 
 Place = tuple[str, int]
 """An array of the model and a place in it, flattened."""
-_WRITES = TURNED | {"servo_gain": "actuator_gainprm", "command_scale": "actuator_gainprm"}
+_WRITES = TURNED | {
+    "body_moment": "body_inertia",
+    "servo_gain": "actuator_gainprm",
+    "command_scale": "actuator_gainprm",
+}
 """The array that a made field changes."""
 
 
@@ -86,13 +90,9 @@ def changed(a: mujoco.MjModel, b: mujoco.MjModel) -> Iterator[Place]:
 
 
 def _places(scene: mujoco.MjModel, candidate: Candidate, where: str) -> set[Place]:
-    """Numbers that a candidate writes; for a turn the whole quaternion, for a servo its gain."""
+    """Numbers that a candidate writes; a turn the whole quaternion, a moment all inertias, a drive its gain."""
     name, bracket, index = candidate.field.partition("[")
-    if name in _WRITES:
-        field = _WRITES[name] + ("" if name.endswith("_turn") else "[0]")
-    else:
-        field = name + bracket + index
-    found = entry(scene, field, candidate.of, where)
+    found = entry(scene, _WRITES.get(name, name + bracket + index), candidate.of, where)
     return {(found.array, int(place)) for place in found.flat}
 
 

@@ -16,8 +16,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from compass_ros.cells.auto_drives import actuator_fields, joint_fields
+from compass_ros.cells.auto_drives import actuator_fields, tendon_fields
+from compass_ros.cells.auto_joints import joint_fields
 from compass_ros.cells.candidate import Candidate, around, times
+from compass_ros.cells.made_fields import moments
 
 _GEOM, _JOINT = mujoco.mjtGeom, mujoco.mjtJoint
 _SIZES = {
@@ -36,7 +38,7 @@ _FLUID = ("fluid", "drag_blunt", "drag_slender", "drag_angular", "lift_kutta", "
 
 
 def candidates(m: mujoco.MjModel) -> Iterator[Candidate]:
-    """All tunable fields of a scene: options, bodies, geoms, contact pairs, joints, actuators, in this order."""
+    """All tunable fields of a scene: options, bodies, geoms, contact pairs, joints, tendons, actuators, in order."""
     yield from _options(m)
     for body in range(1, m.nbody):
         if m.body(body).name:
@@ -51,6 +53,9 @@ def candidates(m: mujoco.MjModel) -> Iterator[Candidate]:
     for joint in range(m.njnt):
         if m.joint(joint).name:
             yield from joint_fields(m, joint)
+    for tendon in range(m.ntendon):
+        if m.tendon(tendon).name:
+            yield from tendon_fields(m, tendon)
     for actuator in range(m.nu):
         if m.actuator(actuator).name:
             yield from actuator_fields(m, actuator)
@@ -80,8 +85,8 @@ def _body(m: mujoco.MjModel, body: int) -> Iterator[Candidate]:
         size = float(np.sqrt(2.5 * m.body_inertia[body].max() / mass))
         simple = bool(m.body_simple[body])  # MuJoCo has compiled its inertia as diagonal
         for i, axis in enumerate("xyz"):
-            inertia, centre = float(m.body_inertia[body, i]), float(m.body_ipos[body, i])
-            yield times(f"{name}@dyna@inertia_{axis}", f"body_inertia[{i}]", name, inertia, 0.2, 0.05, "kg m^2")
+            moment, centre = float(moments(m.body_inertia[body])[i]), float(m.body_ipos[body, i])
+            yield _moment(f"{name}@dyna@moment_{axis}", f"body_moment[{i}]", name, moment, m.body_inertia[body].max())
             if not simple:
                 where = f"{name}@dyna@centre_{axis}"
                 yield around(where, f"body_ipos[{i}]", name, centre, 0.2 * size, 0.02 * size, "m")
@@ -92,6 +97,12 @@ def _body(m: mujoco.MjModel, body: int) -> Iterator[Candidate]:
             yield around(f"{name}@pose@{axis}", f"body_pos[{i}]", name, place, 0.005, 0.0005, "m")
         for i, axis in enumerate(("roll", "pitch", "yaw")):
             yield around(f"{name}@pose@{axis}", f"body_turn[{i}]", name, 0.0, 0.02, 0.002, "rad")
+
+
+def _moment(name: str, field: str, of: str, value: float, largest: float) -> Candidate:
+    """As far as an inertia is uncertain; none of a real body is negative, that of a flat one is zero."""
+    width = max(0.05 * value, 0.005 * largest)
+    return Candidate(name, field, of, value, max(value - 4 * width, 0.2 * value), value + 4 * width, width, "kg m^2")
 
 
 def _geom(m: mujoco.MjModel, geom: int) -> Iterator[Candidate]:

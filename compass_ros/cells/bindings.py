@@ -11,7 +11,7 @@ from compass_ros.cells.cell import Cell
 from compass_ros.cells.fields import parse, rows, rows_of
 from compass_ros.cells.spec import ActionSpec, ObjectSpec, ParameterSpec
 from compass_ros.errors import ConfigError
-from compass_ros.types import QUANTITY_SIZE, Floats, Ints
+from compass_ros.types import QUANTITY_SIZE, Bools, Floats, Ints
 
 _FREE, _SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
@@ -35,10 +35,17 @@ class Command:
         if self._name != "ctrl":
             (positions if self._name == "qpos" else velocities)[:, self._place] = inputs[:, self._column]
 
+    def drive(self, time: Floats, driven: Bools) -> None:
+        """Mark in (T, nu) when it says what its actuator is told, instead of the keyframe."""
+        if self._name == "ctrl":
+            driven[self._now(time), self._place] = True
+
     def hold(self, inputs: Floats, time: Floats, controls: Floats) -> None:
         if self._name == "ctrl":
-            now = (time >= self._from - 1e-9) & (time < self._until - 1e-9)
-            controls[:, now, self._place] += inputs[:, self._column, None]
+            controls[:, self._now(time), self._place] += inputs[:, self._column, None]
+
+    def _now(self, time: Floats) -> Bools:
+        return np.asarray((time >= self._from - 1e-9) & (time < self._until - 1e-9))
 
 
 class Start:

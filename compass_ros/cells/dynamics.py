@@ -36,6 +36,11 @@ class Dynamics(Protocol):
         """Write (B, P) parameter values into B models. What MuJoCo derives from them (mj_setConst) is the caller's."""
         ...
 
+    @property
+    def first(self) -> Floats:
+        """(s,) state (mjSTATE_FULLPHYSICS) in which the scene begins, before `start` says where it is and moves to."""
+        ...
+
     def start(self, values: Floats, inputs: Floats) -> tuple[Floats, Floats]:
         """(B, nq) positions and (B, nv) velocities at simulated time 0."""
         ...

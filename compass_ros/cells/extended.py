@@ -29,6 +29,10 @@ class Extended:
         self._own.apply(models, values[:, : self._count])
         self._fields.write(models, values)
 
+    @property
+    def first(self) -> Floats:
+        return self._own.first
+
     def start(self, values: Floats, inputs: Floats) -> tuple[Floats, Floats]:
         return self._own.start(values[:, : self._count], inputs)
 

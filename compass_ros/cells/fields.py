@@ -1,8 +1,8 @@
 """Parameters that are fields of a MuJoCo scene: `geom_friction[0]` of a geom, `opt.gravity[2]`, and a few made ones.
 
 A plain field is an array of mjModel with the element's kind in front of it (geom_, body_, jnt_, dof_, actuator_, pair_,
-tendon_, site_, eq_, qpos_), or one of `opt.`. Without an index all numbers of the element are set. Bounding
-radii follow a size, and the inertia a mass. Made fields: made_fields.py.
+tendon_, site_, eq_, qpos_), or one of `opt.`. Without an index all numbers of the element are set. What follows
+from a field: derived.py. Made fields: made_fields.py.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from compass_ros.cells.made_fields import ELEMENT, OUTSIDE, Made, bounding, early_writers, late_writers
+from compass_ros.cells.derived import clear_shortcuts, followers
+from compass_ros.cells.made_fields import ELEMENT, OUTSIDE, Made, early_writers, late_writers
 from compass_ros.cells.spec import ParameterSpec
 from compass_ros.errors import ConfigError, nearest
 from compass_ros.types import Floats, Ints
@@ -152,10 +153,9 @@ class Fields:
                 flat, columns = self._plain.get(found.array, (np.zeros(0, int), np.zeros(0, int)))
                 own = np.full(len(found.flat), column)
                 self._plain[found.array] = (np.concatenate([flat, found.flat]), np.concatenate([columns, own]))
-        self._early, self._late = early_writers(model, made), late_writers(model, made, where)
-        sized = self._plain["geom_size"][0] // 3 if "geom_size" in self._plain else np.zeros(0, int)
-        self._bound = [bounding(model, int(geom), where) for geom in np.unique(sized)]
-        prepare(model, used)
+        self._early, self._late = early_writers(model, made, where), late_writers(model, made, where)
+        self._followers = followers(model, {array: flat for array, (flat, _) in self._plain.items()}, where)
+        clear_shortcuts(model, used)
 
     def write(self, models: Sequence[mujoco.MjModel], values: Floats) -> None:
         """Write every parameter; the rest of the models is left alone."""
@@ -166,8 +166,8 @@ class Fields:
                 _set(model, array, flat, row[columns])
             for writer in self._late:
                 writer(model, row)
-            for bound in self._bound:
-                bound(model)
+            for follow in self._followers:
+                follow(model)
 
 
 def _set(model: mujoco.MjModel, array: str, flat: Ints, values: Floats) -> None:
@@ -181,15 +181,3 @@ def _set(model: mujoco.MjModel, array: str, flat: Ints, values: Floats) -> None:
         return
     target = getattr(model, array).reshape(-1)
     target[flat] = np.round(values) if np.issubdtype(target.dtype, np.integer) else values
-
-
-def prepare(model: mujoco.MjModel, used: set[str]) -> None:
-    """Clear the flags by which MuJoCo skips frames that are the identity at the defaults."""
-    if used & {"geom_pos", "geom_quat", "geom_turn"}:
-        model.geom_sameframe[:] = 0
-    if used & {"site_pos", "site_quat"}:
-        model.site_sameframe[:] = 0
-    if used & {"body_ipos", "body_iquat", "inertia_turn"}:
-        model.body_sameframe[:] = 0
-    if "geom_size" in used:
-        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE  # its boxes are those of the default sizes

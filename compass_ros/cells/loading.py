@@ -8,6 +8,7 @@ from pathlib import Path
 from compass_ros.cells.auto import with_auto
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.registry import dynamics_of
+from compass_ros.cells.scene_files import scene_files
 from compass_ros.cells.spec import validated_spec
 from compass_ros.config import Parameters, read_yaml
 from compass_ros.errors import ConfigError, nearest
@@ -35,9 +36,15 @@ def load(name_or_path: str | Path, parameters: Parameters = "cell") -> Cell:
     model = path.parent / spec.model
     if not model.is_file():
         raise ConfigError(f"{path}: model: no file {model}")
-    cell = Cell(spec, path, hashlib.sha256(path.read_bytes() + model.read_bytes()).hexdigest()[:16])
+    cell = Cell(spec, path, _hash(path, model))
     dynamics_of(cell)
     return with_auto(cell) if spec.auto or parameters == "auto" else cell
+
+
+def _hash(path: Path, model: Path) -> str:
+    """Of the YAML, of the scene, and of all files that the scene is made of."""
+    contents = [path, model, *scene_files(model).further]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in contents)).hexdigest()[:16]
 
 
 def cells_folder() -> Path:

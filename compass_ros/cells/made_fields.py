@@ -7,7 +7,8 @@
 | `inertia_turn[axis]` | body | the same of the axes of its inertia, about an axis of the body |
 | `contact_solref[i]`, `contact_solimp[i]` | geom | a contact pair takes the mean of its two geoms |
 | `contact_friction[i]` | geom | the same for sliding (0), turning (1) and rolling (2) friction |
-| `servo_gain` | actuator | gain of a position or velocity servo: gainprm[0] and the bias that belongs to it |
+| `body_moment[axis]` | body | second moment of its mass along a principal axis: the inertia about the other two |
+| `servo_gain` | actuator | strength of a drive: its gain, and the bias that belongs to it in proportion |
 | `command_scale` | actuator | share of the command that arrives |
 | `table_friction`, `table_creep`, `table_load` | body | Coulomb friction of a body that slides on a table, as a force |
 | `start_qpos[i]`, `start_qvel[i]` | joint | added to the first position or velocity of every episode |
@@ -16,20 +17,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
+from compass_ros.cells.made_drives import Writer, command, strength, whole_command
 from compass_ros.errors import ConfigError
 from compass_ros.types import Floats
 
-Writer = Callable[[mujoco.MjModel, Floats], None]
-"""Writes (P,) values into a model."""
 OUTSIDE = ("table_friction", "table_creep", "table_load", "start_qpos", "start_qvel", "observed_offset")
 """Made fields that act outside of the model."""
-_GEOM = mujoco.mjtGeom
 
 
 @dataclass(frozen=True)
@@ -46,6 +45,7 @@ class Made:
 
 ELEMENT = {
     "body_mass": "body",
+    "body_moment": "body",
     "body_turn": "body",
     "geom_turn": "geom",
     "inertia_turn": "body",
@@ -60,16 +60,19 @@ TURNED = {"geom_turn": "geom_quat", "body_turn": "body_quat", "inertia_turn": "b
 """The quaternions that are turned."""
 
 
-def early_writers(scene: mujoco.MjModel, made: Sequence[Made]) -> list[Writer]:
-    """Writers that go before the plain fields, for the scene at its defaults."""
+def early_writers(scene: mujoco.MjModel, made: Sequence[Made], where: str) -> list[Writer]:
+    """Writers that go before the plain fields, for the scene at its defaults. Raises ConfigError."""
     masses = [_mass(scene, m) for m in made if m.name == "body_mass"]
-    return masses + [_servo(scene, m) for m in made if m.name == "servo_gain"]
+    moments = [_moments(scene, body, made) for body in sorted({m.row for m in made if m.name == "body_moment"})]
+    scaled, driven = ([m for m in made if m.name == name] for name in ("command_scale", "servo_gain"))
+    gains = [whole_command(scene, m.row, f"{where}: {m.name}") for m in scaled]
+    return masses + moments + gains + [strength(scene, m.row, m.column, f"{where}: {m.name}") for m in driven]
 
 
 def late_writers(scene: mujoco.MjModel, made: Sequence[Made], where: str) -> list[Writer]:
     """Writers that go after the plain fields. Raises ConfigError."""
     turns = [_turn(scene, name, made) for name in TURNED if any(m.name == name for m in made)]
-    commands = [_command(scene, m) for m in made if m.name == "command_scale"]
+    commands = [command(scene, m.row, m.column) for m in made if m.name == "command_scale"]
     return turns + _mixtures(scene, [m for m in made if m.name.startswith("contact_")], where) + commands
 
 
@@ -79,6 +82,28 @@ def _mass(scene: mujoco.MjModel, made: Made) -> Writer:
     def write(model: mujoco.MjModel, values: Floats) -> None:
         model.body_mass[made.row] = values[made.column]
         model.body_inertia[made.row] = inertia * (values[made.column] / mass if mass else 1.0)
+
+    return write
+
+
+def moments(inertia: Floats) -> Floats:
+    """(3,) second moments of a mass along its principal axes [kg m^2]: the integral of x^2 dm, ...; none is negative.
+
+    Of (3,) principal inertias. No other numbers belong to a real body: that they are positive says the same as that no
+    inertia is more than the sum of the other two (Wensing et al., IEEE RA-L 3(1), 2018).
+    """
+    return np.asarray(np.maximum(0.5 * inertia.sum() - inertia, 0.0))
+
+
+def _moments(scene: mujoco.MjModel, body: int, made: Sequence[Made]) -> Writer:
+    own = [m for m in made if m.name == "body_moment" and m.row == body]
+    inertia = scene.body_inertia[body].copy()
+    nominal, axes, columns = moments(inertia), [m.index for m in own], [m.column for m in own]
+
+    def write(model: mujoco.MjModel, values: Floats) -> None:
+        more = np.zeros(3)
+        more[axes] = values[columns] - nominal[axes]
+        model.body_inertia[body] = inertia + (more.sum() - more)
 
     return write
 
@@ -101,32 +126,6 @@ def _turn(scene: mujoco.MjModel, name: str, made: Sequence[Made]) -> Writer:
             mujoco.mju_mulQuat(getattr(model, array)[row], turn, nominal[row])
 
     return write
-
-
-def _servo(scene: mujoco.MjModel, made: Made) -> Writer:
-    bias = _bias_index(scene, made.row)
-
-    def write(model: mujoco.MjModel, values: Floats) -> None:
-        model.actuator_gainprm[made.row, 0] = values[made.column]
-        model.actuator_biasprm[made.row, bias] = -values[made.column]
-
-    return write
-
-
-def _command(scene: mujoco.MjModel, made: Made) -> Writer:
-    bias, gain = _bias_index(scene, made.row), float(scene.actuator_gainprm[made.row, 0])
-    servo = bool(scene.actuator_biasprm[made.row, bias])
-
-    def write(model: mujoco.MjModel, values: Floats) -> None:
-        full = -model.actuator_biasprm[made.row, bias] if servo else gain
-        model.actuator_gainprm[made.row, 0] = values[made.column] * full
-
-    return write
-
-
-def _bias_index(scene: mujoco.MjModel, actuator: int) -> int:
-    """Where a servo's gain stands in biasprm: 1 for a position servo, 2 for a velocity servo."""
-    return 1 if scene.actuator_biasprm[actuator, 1] else 2
 
 
 _FRICTION: tuple[list[int], ...] = ([0, 1], [2], [3, 4])
@@ -156,41 +155,3 @@ def _mixture(array: str, numbers: list[int], share: Floats, rest: Floats, column
         getattr(model, array)[:, numbers] = (share @ values[columns] + rest)[:, None]
 
     return write
-
-
-def bounding(scene: mujoco.MjModel, geom: int, where: str) -> Callable[[mujoco.MjModel], None]:
-    """What keeps a geom's bounding radius and box in step with its size. Raises ConfigError for meshes."""
-    kind = int(scene.geom_type[geom])
-    half = _HALF_SIZES.get(kind)
-    if half is None:
-        name = scene.geom(geom).name
-        raise ConfigError(f"{where}: geom_size: geom '{name}' is a mesh or a height field, without a size")
-
-    def write(model: mujoco.MjModel) -> None:
-        if kind == _GEOM.mjGEOM_PLANE:
-            return
-        size = model.geom_size[geom]
-        model.geom_aabb[geom, 3:] = half(size)
-        model.geom_rbound[geom] = _radius(kind, size)
-
-    return write
-
-
-_HALF_SIZES: dict[int, Callable[[Floats], Floats]] = {
-    int(_GEOM.mjGEOM_PLANE): lambda s: s,
-    int(_GEOM.mjGEOM_SPHERE): lambda s: np.full(3, s[0]),
-    int(_GEOM.mjGEOM_CAPSULE): lambda s: np.array([s[0], s[0], s[0] + s[1]]),
-    int(_GEOM.mjGEOM_CYLINDER): lambda s: np.array([s[0], s[0], s[1]]),
-    int(_GEOM.mjGEOM_ELLIPSOID): lambda s: s,
-    int(_GEOM.mjGEOM_BOX): lambda s: s,
-}
-
-
-def _radius(kind: int, size: Floats) -> float:
-    if kind == _GEOM.mjGEOM_SPHERE:
-        return float(size[0])
-    if kind == _GEOM.mjGEOM_CAPSULE:
-        return float(size[0] + size[1])
-    if kind == _GEOM.mjGEOM_CYLINDER:
-        return float(np.hypot(size[0], size[1]))
-    return float(size.max() if kind == _GEOM.mjGEOM_ELLIPSOID else np.linalg.norm(size))

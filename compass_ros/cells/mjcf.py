@@ -11,12 +11,12 @@ from compass_ros.cells.bindings import Command, Start, offsets, shift
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.dynamics import Sliding
 from compass_ros.cells.fields import Fields, names, rows
+from compass_ros.cells.keyframe import STATE, begun, first_state, place_mocap
 from compass_ros.cells.spec import ObjectSpec, ParameterSpec
 from compass_ros.cells.start import input_names
 from compass_ros.errors import ConfigError, nearest
 from compass_ros.types import QUANTITY_SIZE, Floats, Ints
 
-_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS.value
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 _NUDGE_M = 1e-9
 _TABLE = {"table_friction": None, "table_creep": 0.002, "table_load": 1.0}
@@ -29,12 +29,15 @@ class Mjcf:
     def __init__(self, cell: Cell) -> None:
         self._cell = cell
         self._where = str(cell.path)
-        self._model = _compiled(cell)
+        self._model, self._rests_as_drawn = _compiled(cell)
         for p in cell.spec.parameters:
             if not p.field:
                 raise ConfigError(f"{self._where}: {p.name}: field: missing; say which field of the scene it is")
+        data = begun(self._model)
+        place_mocap(self._model, data)
+        self._first, self._positions, self._velocities = first_state(data, self._model), data.qpos, data.qvel
+        self._idle = data.ctrl
         self._fields = Fields(self._model, list(enumerate(cell.spec.parameters)), self._where)
-        self._first = _first_positions(self._model)
         self._commands = [Command(self._model, i, a, self._where) for i, a in enumerate(cell.spec.action)]
         self._starts = _starts(cell, self._model)
         self._columns = np.concatenate([_columns(self._model, o, self._where) for o in cell.objects]).astype(np.int64)
@@ -50,11 +53,16 @@ class Mjcf:
         return self._model
 
     def apply(self, models: Sequence[mujoco.MjModel], values: Floats) -> None:
+        for model in models:
+            model.tendon_lengthspring[self._rests_as_drawn] = -1  # mj_setConst measures it, in the scene as it is tuned
         self._fields.write(models, values)
 
+    @property
+    def first(self) -> Floats:
+        return self._first
+
     def start(self, values: Floats, inputs: Floats) -> tuple[Floats, Floats]:
-        positions = np.tile(self._first, (len(values), 1))
-        velocities = np.zeros((len(values), self._model.nv))
+        positions, velocities = (np.tile(of, (len(values), 1)) for of in (self._positions, self._velocities))
         true = inputs.copy()
         for offset in self._offsets:
             if offset.first is not None:
@@ -68,8 +76,11 @@ class Mjcf:
         return positions, velocities
 
     def controls(self, values: Floats, inputs: Floats, steps: int) -> Floats:
-        controls = np.zeros((len(values), steps, self._model.nu))
         time = self._model.opt.timestep * np.arange(steps)
+        driven = np.zeros((steps, self._model.nu), bool)
+        for command in self._commands:
+            command.drive(time, driven)
+        controls = np.tile(np.where(driven, 0.0, self._idle), (len(values), 1, 1))
         for command in self._commands:
             command.hold(inputs, time, controls)
         return controls
@@ -109,12 +120,6 @@ def _starts(cell: Cell, model: mujoco.MjModel) -> dict[str, Start]:
     return out
 
 
-def _first_positions(model: mujoco.MjModel) -> Floats:
-    """Joint positions at the start: the keyframe `start` where the scene has one, else those of the drawing."""
-    keys = [model.key(i).name for i in range(model.nkey)]
-    return np.asarray(model.key("start").qpos if "start" in keys else model.qpos0, np.float64) + 0.0
-
-
 def _table_fields(model: mujoco.MjModel, parameters: Sequence[ParameterSpec], where: str) -> dict[str, dict[str, int]]:
     """body -> field -> parameter, of the bodies that slide on a table. Raises ConfigError."""
     out: dict[str, dict[str, int]] = {}
@@ -136,7 +141,7 @@ def _columns(model: mujoco.MjModel, obj: ObjectSpec, where: str) -> Ints:
     free = _free_address(model, name)
     if free is not None:
         return np.arange(free, free + size)
-    first = mujoco.mj_stateSize(model, _STATE) - 1
+    first = mujoco.mj_stateSize(model, STATE) - 1
     position = first + int(model.sensor(_sensor(obj, "position")).adr[0])
     orientation = first + int(model.sensor(_sensor(obj, "orientation")).adr[0])
     return np.concatenate([position + np.arange(min(size, 3)), orientation + np.arange(size - min(size, 3))])
@@ -153,8 +158,11 @@ def _sensor(obj: ObjectSpec, what: str) -> str:
     return f"compass/{obj.name}/{what}"
 
 
-def _compiled(cell: Cell) -> mujoco.MjModel:
-    """The scene, with sensors for what is tracked. Raises ConfigError with MuJoCo's own words in one line."""
+def _compiled(cell: Cell) -> tuple[mujoco.MjModel, Ints]:
+    """The scene, with sensors for what is tracked, and the tendons whose spring rests at the length that is drawn.
+
+    Raises ConfigError with MuJoCo's own words in one line.
+    """
     try:
         spec = mujoco.MjSpec.from_file(str(cell.model_path))
         nominal = spec.compile()
@@ -172,24 +180,45 @@ def _compiled(cell: Cell) -> mujoco.MjModel:
             sensor = spec.add_sensor()
             sensor.name, sensor.type = _sensor(obj, what), getattr(mujoco.mjtSensor, f"mjSENS_{kind}")
             sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_XBODY, name
-    _unsimplify(spec, nominal, cell.spec.parameters)
-    return spec.compile()
+    simple = _tuned_though_simple(nominal, cell.spec.parameters)
+    for name in simple:
+        _nudge(spec.body(name), nominal.body(name))
+    model = spec.compile()
+    if simple:
+        _same_numbers(model, nominal)
+    as_drawn = [tendon.id for tendon in spec.tendons if tendon.springlength[0] < 0]
+    return model, np.array(as_drawn, np.int64)
 
 
-def _unsimplify(spec: mujoco.MjSpec, nominal: mujoco.MjModel, parameters: Sequence[ParameterSpec]) -> None:
-    """Bodies whose inertial frame or joint's place is tuned: MuJoCo must not take their inertia matrix for diagonal."""
+def _tuned_though_simple(nominal: mujoco.MjModel, parameters: Sequence[ParameterSpec]) -> list[str]:
+    """Bodies whose inertial frame or joint's place is tuned, and whose inertia matrix MuJoCo has taken for diagonal."""
+    tuned: list[str] = []
     for p in parameters:
+        of = [one.strip() for one in p.of.split(",")]
         if p.field.startswith(("body_ipos", "body_iquat", "inertia_turn")):
-            tuned = [one.strip() for one in p.of.split(",")]
+            tuned += of
         elif p.field.startswith(("jnt_pos", "jnt_axis")):
-            found = [mujoco.mj_name2id(nominal, mujoco.mjtObj.mjOBJ_JOINT, one.strip()) for one in p.of.split(",")]
-            tuned = [nominal.body(nominal.jnt_bodyid[joint]).name for joint in found if joint >= 0]
-        else:
-            continue
-        for name in tuned:
-            body = spec.body(name)
-            if body is not None:
-                own = nominal.body(name)
-                body.explicitinertial = True
-                body.mass, body.inertia, body.iquat = float(own.mass[0]), own.inertia, own.iquat
-                body.ipos = own.ipos + _NUDGE_M
+            found = [mujoco.mj_name2id(nominal, mujoco.mjtObj.mjOBJ_JOINT, one) for one in of]
+            tuned += [nominal.body(nominal.jnt_bodyid[joint]).name for joint in found if joint >= 0]
+    return [n for n in dict.fromkeys(tuned) if n in names(nominal, mujoco.mjtObj.mjOBJ_BODY) and _simple(nominal, n)]
+
+
+def _simple(model: mujoco.MjModel, body: str) -> bool:
+    return bool(model.body_simple[model.body(body).id])
+
+
+def _nudge(body: mujoco.MjsBody, own: object) -> None:
+    """Place a body's centre a little beside its frame, whatever its inertia was read from."""
+    body.explicitinertial = True
+    body.mass, body.inertia, body.iquat = float(own.mass[0]), own.inertia, own.iquat  # type: ignore[attr-defined]
+    body.ipos = own.ipos + _NUDGE_M  # type: ignore[attr-defined]
+    body.fullinertia = np.full(6, np.nan)  # unset: what it said is in the inertia and the orientation of its axes now
+    body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+
+
+def _same_numbers(model: mujoco.MjModel, nominal: mujoco.MjModel) -> None:
+    """Give a model the numbers of another one; what is not a number (structure, flags) and sensors stay its own."""
+    for name in dir(nominal):
+        numbers = getattr(nominal, name, None)
+        if isinstance(numbers, np.ndarray) and numbers.dtype.kind == "f" and not name.startswith("sensor"):
+            getattr(model, name)[:] = numbers

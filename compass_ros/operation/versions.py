@@ -1,8 +1,8 @@
 """Which parameters a cell's simulator runs with: versions on disk, applied and taken back by a person.
 
     FOLDER/CELL/state.yaml          the versions applied, oldest first; version 0 is the cell as configured
-    FOLDER/CELL/0001/               result.json, scene.xml, effects.yaml, report.html as the calibration left them,
-                                    parameters.yaml (name: value), origin.yaml (what they came from)
+    FOLDER/CELL/0001/               result.json, scene.xml, its assets/, effects.yaml, report.html as a calibration
+                                    left them, parameters.yaml (name: value), origin.yaml (what they came from)
 
 A version is complete before its name appears, and no version is ever changed.
 """
@@ -26,6 +26,8 @@ NOT_TO_BE_APPLIED = ("fit_failed", "data_bad")
 """Verdicts that say that the parameters mean nothing."""
 _STATE, _RESULT = "state.yaml", "result.json"
 _COPIED = (_RESULT, "scene.xml", "effects.yaml", "report.html")
+_FILES = "assets"
+"""Folder of what the scene is made of."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,8 @@ class Versions:
             for name in _COPIED:
                 if (result / name).is_file():
                     shutil.copy2(result / name, work / name)
+            if (result / _FILES).is_dir():
+                shutil.copytree(result / _FILES, work / _FILES)
             (work / "parameters.yaml").write_text(yaml.safe_dump(parameters, sort_keys=False), encoding="utf-8")
             (work / "origin.yaml").write_text(yaml.safe_dump(said, sort_keys=False), encoding="utf-8")
             work.rename(version.folder)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,11 +13,14 @@ import numpy as np
 
 from compass_ros.cells import Cell
 from compass_ros.cells.registry import dynamics_of
+from compass_ros.cells.scene_files import SceneFiles, scene_files
 from compass_ros.simulation.effects import FittedEffect, write_effects
-from compass_ros.simulation.native.program import mujoco_library
+from compass_ros.simulation.native.program import mujoco_library, save_numbers
 from compass_ros.simulation.simulator import Simulator
 from compass_ros.types import Floats
 
+FILES = "assets"
+"""Folder beside a written scene."""
 _EXACT = 17
 """Digits that give every double back."""
 
@@ -24,28 +28,57 @@ _EXACT = 17
 def write_scene(cell: Cell, values: Floats, path: Path) -> None:
     """The cell's scene with (P,) values in it, as MJCF that MuJoCo loads by itself, exact to the last digit.
 
-    What is no field of a model (the speed that an arm reaches, a camera's bias) stays in result.json.
+    Its meshes, textures, height fields and skins are copied into the folder `FILES` beside it. What is no field of a
+    model (the speed that an arm reaches, a camera's bias) stays in result.json.
     """
-    model = mujoco.MjModel.from_xml_path(str(cell.model_path))
-    dynamics_of(cell).apply([model], values[None])
+    spec = mujoco.MjSpec.from_file(str(cell.model_path))
+    spec.compiler.saveinertial = True  # else MuJoCo computes masses from the drawing again
+    spec.comment = spec.comment.replace("--", "- -")  # MuJoCo reads that, XML has no such comment
+    model = _calibrated(spec, cell, values)
     with _digits(_EXACT):
-        mujoco.mj_saveLastXML(str(path), model)
-    _with_inertias(path, model)
+        save_numbers(spec, model, path)
+    root = ElementTree.parse(path).getroot()
+    for source, name in _with_files(root, scene_files(cell.model_path), spec.meshdir, spec.texturedir).items():
+        (path.parent / FILES).mkdir(exist_ok=True)
+        shutil.copyfile(source, path.parent / FILES / name)
+    ElementTree.indent(root)
+    path.write_text(ElementTree.tostring(root, encoding="unicode"), encoding="utf-8")
 
 
-def _with_inertias(path: Path, model: mujoco.MjModel) -> None:
-    """Write masses where bodies have them from their geoms: MuJoCo would compute them from the drawing again."""
-    tree = ElementTree.parse(path)
-    for element in tree.iter("body"):
-        if element.find("inertial") is not None or not element.get("name"):
-            continue
-        body = model.body(element.get("name"))
-        if body.mass[0] > 0:
-            numbers = {"pos": body.ipos, "quat": body.iquat, "mass": body.mass, "diaginertia": body.inertia}
-            text = {name: " ".join(repr(float(x)) for x in value) for name, value in numbers.items()}
-            element.insert(0, ElementTree.Element("inertial", text))
-    ElementTree.indent(tree)
-    tree.write(path, encoding="utf-8")
+def _calibrated(spec: mujoco.MjSpec, cell: Cell, values: Floats) -> mujoco.MjModel:
+    """A scene's model with (P,) values in it. What `mj_copyBack` would leave out is written into the scene before."""
+    dynamics, model = dynamics_of(cell), spec.compile()
+    dynamics.apply([model], values[None])
+    left_out = [
+        *((geom, "fluid_coefs", model.geom_fluid[geom.id, 1:6]) for geom in spec.geoms if geom.fluid_ellipsoid),
+        *((body, "gravcomp", model.body_gravcomp[body.id]) for body in spec.bodies),
+        *((tendon, "springlength", model.tendon_lengthspring[tendon.id]) for tendon in spec.tendons),
+        *((actuator, "lengthrange", model.actuator_lengthrange[actuator.id]) for actuator in spec.actuators),
+    ]
+    changed = [(of, name, value) for of, name, value in left_out if not np.array_equal(getattr(of, name), value)]
+    for of, name, value in changed:
+        setattr(of, name, value)
+    if changed:
+        model = spec.compile()
+        dynamics.apply([model], values[None])
+    return model
+
+
+def _with_files(root: ElementTree.Element, files: SceneFiles, meshes: str, textures: str) -> dict[Path, str]:
+    """Let a scene name its files as they will lie beside it. Returns where each is, and its name there."""
+    placed: dict[Path, str] = {}
+    for element in root.iterfind("*/*"):  # assets, and skins under <deformable>
+        for attribute in [a for a in element.attrib if a.startswith("file")]:
+            source = files.find(element.attrib[attribute], textures if element.tag == "texture" else meshes)
+            if source is not None:
+                own = placed.get(source, source.name)
+                taken = own in [name for other, name in placed.items() if other != source]
+                placed[source] = f"{len(placed)}_{own}" if taken else own
+                element.attrib[attribute] = f"{FILES}/{placed[source]}"
+    for compiler in root.iterfind("compiler"):
+        for folder in ("meshdir", "texturedir", "assetdir", "strippath"):
+            compiler.attrib.pop(folder, None)
+    return placed
 
 
 @contextmanager

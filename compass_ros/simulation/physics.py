@@ -16,8 +16,6 @@ from compass_ros.simulation.effects.effect import Context, Sample, restore
 from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.types import QUANTITY_SIZE, Floats, Parameter
 
-STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS.value
-
 
 @dataclass(frozen=True)
 class Physics:
@@ -104,7 +102,7 @@ class Physics:
     def start(self, values: Floats, inputs: Floats) -> Floats:
         """(B, s) states at simulated time 0."""
         nq, nv = self.model.nq, self.model.nv
-        start = np.zeros((len(values), mujoco.mj_stateSize(self.model, STATE)))
+        start = np.tile(self.dynamics.first, (len(values), 1))
         start[:, 1 : 1 + nq], start[:, 1 + nq : 1 + nq + nv] = self.dynamics.start(
             self.of_cell(values), self.of_command(inputs)
         )

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import cast
 
+import mujoco
+import numpy as np
 import yaml
 
 from compass_ros.cells import Cell, load
+from compass_ros.types import Floats
 
 TOSS = """
 <mujoco model="toss">
@@ -100,3 +104,19 @@ def written(folder: Path, scene: str, yaml_content: Mapping[str, object]) -> Cel
     (folder / "scene.xml").write_text(scene, encoding="utf-8")
     (folder / "cell.yaml").write_text(yaml.safe_dump(dict(yaml_content)), encoding="utf-8")
     return load(folder / "cell.yaml")
+
+
+_LEFT_OUT = ("_", "name", "paths", "sensor", "body_sameframe", "geom_sameframe", "site_sameframe", "body_simple")
+
+
+def differing(one: mujoco.MjModel, other: mujoco.MjModel, within: float = 0.0) -> set[str]:
+    """Arrays and options of two models of a scene that differ by more than that: without texts, sensors, shortcuts."""
+    arrays = [n for n in dir(one) if isinstance(getattr(one, n, None), np.ndarray) and not n.startswith(_LEFT_OUT)]
+    options = [f"opt.{n}" for n in dir(one.opt) if isinstance(getattr(one.opt, n), (np.ndarray, float))]
+    return {name for name in (*arrays, *options) if _apart(*(attrgetter(name)(m) for m in (one, other))) > within}
+
+
+def _apart(one: Floats, other: Floats) -> float:
+    if np.shape(one) != np.shape(other):
+        return float("inf")
+    return float(np.max(np.abs(np.asarray(one, float) - np.asarray(other, float)), initial=0.0))

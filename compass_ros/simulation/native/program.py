@@ -121,8 +121,8 @@ def evaluate(term: Term, states: Floats, gravity: float) -> Floats:
     return out
 
 
-def _address(model: mujoco.MjModel) -> int:
-    """Of the mjModel that the callback will see."""
+def _address(model: mujoco.MjModel | mujoco.MjSpec) -> int:
+    """Of what C calls mjModel (the one that the callback will see) or mjSpec."""
     return int(model._address)  # noqa: SLF001 - MuJoCo offers it under this name alone
 
 
@@ -158,7 +158,19 @@ def _joints_of(model: mujoco.MjModel, body: int) -> Placement:
 @cache
 def mujoco_library() -> ctypes.CDLL:
     """MuJoCo's own functions, the few that the package for Python does not hand on."""
-    return ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco.so*"))))
+    library = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco.so*"))))
+    library.mj_copyBack.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
+    library.mj_saveXML.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_char_p, ctypes.c_int]
+    return library
+
+
+def save_numbers(spec: mujoco.MjSpec, model: mujoco.MjModel, path: Path) -> None:
+    """Write a scene as MJCF with the numbers of a model that was compiled from it and changed since."""
+    library, said = mujoco_library(), ctypes.create_string_buffer(500)
+    if library.mj_copyBack(_address(spec), _address(model)) != 1:
+        raise RuntimeError("MuJoCo does not take the model for one of this scene")
+    if library.mj_saveXML(_address(spec), str(path).encode(), said, len(said)):
+        raise OSError(f"{path}: {said.value.decode()}")
 
 
 @cache
