@@ -26,7 +26,9 @@ from compass_ros.discovery.unseen import unexpected
 from compass_ros.errors import DataError
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.factors import factor_distance
+from compass_ros.simulation.manifold import apart, charted, on_manifold
 from compass_ros.simulation.replay import Recordings, Replay, recordings, rms_distance
+from compass_ros.simulation.windows import windows
 from compass_ros.types import (
     Budget,
     Episode,
@@ -55,7 +57,12 @@ def calibrate(
     told = []
     for turn in range(2):
         fit, held_out = split(used, config, turn)
-        data, judge = recordings(cell, fit), recordings(cell, held_out or fit)
+        data, judge = (
+            recordings(cell, evenly(windows(cell, fit), config.episodes)),
+            recordings(cell, windows(cell, held_out or fit)),
+        )
+        judge = judge.numbered(len(data.names))
+        simulator = simulator.driven(data.drives + judge.drives)
         noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
         problem, unseen = pose(simulator, data, noise), pose(simulator, judge, noise).likelihood
 
@@ -115,13 +122,14 @@ def pose(simulator: Simulator, data: Recordings, noise: Noise) -> Problem:
     likelihood = Likelihood(
         predict=simulator.observe,
         predict_alike=simulator.observe_alike,
+        difference=partial(apart, cell),
         parameters=simulator.parameters,
         inputs=simulator.inputs(data.inputs),
         time_s=data.time_s,
-        measured=data.measured,
-        sigma=noise.of(data.measured),
+        measured=np.where(cell.fitted, charted(cell, data.measured), np.nan),
+        sigma=on_manifold(cell, noise.of(data.measured)),
         correlation_time=noise.correlation_time,
-        launch_std=simulator.launch_std(simulator.defaults),
+        launch_std=simulator.launch_std(simulator.defaults, data.start_std),
         prior_mean=simulator.defaults,
         prior_std=np.array([p.half_width for p in simulator.parameters]),
     )
@@ -129,7 +137,7 @@ def pose(simulator: Simulator, data: Recordings, noise: Noise) -> Problem:
         differences=replay.differences,
         trajectories=replay.predict,
         measured=np.nan_to_num(data.measured),
-        weight=np.where(np.isnan(data.measured), 0.0, 1 / noise.of(data.measured)),
+        weight=np.where(np.isnan(data.measured) | ~cell.fitted, 0.0, 1 / noise.of(data.measured)),
         actions=data.inputs,
         parameters=simulator.parameters,
         factors=tuple(f.name for f in cell.factors),
@@ -226,7 +234,9 @@ def launched(simulator: Simulator, data: Recordings, noise: Noise, values: Float
     How an arm repeats itself, or a first state that was measured with noise, differs from shot to shot: it says
     nothing about a simulator. Where the cell calls its launches exact they stay as commanded.
     """
-    likelihood = replace(pose(simulator, data, noise).likelihood, launch_std=simulator.launch_std(values))
+    likelihood = replace(
+        pose(simulator, data, noise).likelihood, launch_std=simulator.launch_std(values, data.start_std)
+    )
     return Replay(simulator, data, with_launches(likelihood, values).launch)
 
 
@@ -246,7 +256,7 @@ def _draw(cell: Cell, data: Recordings, models: dict[str, tuple[Replay, Floats]]
     predicted = {
         name: replay.predict(np.tile(values, (len(episodes), 1)), episodes) for name, (replay, values) in models.items()
     }
-    columns = {o.name: [i for i, c in enumerate(cell.channels) if c == o.name] for o in cell.objects}
+    columns = {s.name: list(range(s.first, s.columns.stop)) for s in cell.signals}
     out = []
     for e, name in enumerate(data.names):
         tracks = []

@@ -19,11 +19,54 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 Unit = Literal["m", "rad"]
-Quantity = Literal["xy", "xyz", "pose", "joint"]
+Quantity = Literal[
+    "xy",
+    "xyz",
+    "pose",
+    "joint",
+    "joint_position",
+    "joint_velocity",
+    "joint_effort",
+    "position",
+    "scalar",
+    "twist",
+    "wrench",
+    "gyro",
+    "accelerometer",
+]
 """What one row of a track holds: planar position [m], position [m], position [m] + quaternion, joint position [rad or
-m]."""
+m]; joint positions [rad or m], velocities [rad/s or m/s] or efforts [N m or N] of several joints; position [m]; numbers
+without a meaning of their own; linear and angular velocity [m/s, rad/s]; force and torque [N, N m]; angular velocity
+[rad/s]; acceleration [m/s^2]."""
 
-QUANTITY_SIZE: Mapping[Quantity, int] = {"xy": 2, "xyz": 3, "pose": 7, "joint": 1}
+QUANTITY_SIZE: Mapping[Quantity, int] = {
+    "xy": 2,
+    "xyz": 3,
+    "pose": 7,
+    "joint": 1,
+    "joint_position": 1,
+    "joint_velocity": 1,
+    "joint_effort": 1,
+    "position": 3,
+    "scalar": 1,
+    "twist": 6,
+    "wrench": 6,
+    "gyro": 3,
+    "accelerometer": 3,
+}
+"""Numbers in a row; of what is asked of several joints (or of several scalars): for each of them."""
+
+NUMBERS: Mapping[Quantity, tuple[str, ...]] = {
+    "xy": ("x", "y"),
+    "xyz": ("x", "y", "z"),
+    "position": ("x", "y", "z"),
+    "pose": ("x", "y", "z", "qw", "qx", "qy", "qz"),
+    "twist": ("vx", "vy", "vz", "wx", "wy", "wz"),
+    "wrench": ("fx", "fy", "fz", "tx", "ty", "tz"),
+    "gyro": ("wx", "wy", "wz"),
+    "accelerometer": ("ax", "ay", "az"),
+}
+"""What the numbers of a row are called, where the quantity itself says it."""
 
 WRONG = 3.0
 """Error bars from which a parameter has moved: of 64 right ones, one in six calibrations shows one by chance."""
@@ -59,14 +102,18 @@ class ActionField:
 
 @dataclass(frozen=True)
 class Track:
-    """What a sensor saw of one object. Frames in which the object was not seen are absent."""
+    """What a sensor saw of one object, or a time series of several numbers: a signal, or an input that was recorded.
+
+    Frames in which the object was not seen are absent; a number that a message lacked is NaN.
+    """
 
     object: str
+    """Name of the object, signal or input."""
     quantity: Quantity
     stamp_ns: Ints
     """(F,) strictly increasing, the sensor's clock."""
     value: Floats
-    """(F, QUANTITY_SIZE[quantity]) in the frame `table`."""
+    """(F, D) in the cell's frame; D is QUANTITY_SIZE[quantity], times the joints of a signal of joints."""
     std: Floats | None = None
     """(F,) one standard deviation of the position [m] (joint: [rad]) as the sensor states it; None: not stated."""
     frame: str = ""
@@ -95,6 +142,12 @@ class Episode:
     """The same objects seen in other frames than those of `tracks`: kept apart, and not used."""
     remarks: tuple[str, ...] = ()
     """What reading left out or chose, one sentence each."""
+    inputs: tuple[Track, ...] = ()
+    """What drove the robot, as recorded: one series for each input of the cell."""
+    initial_std: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    """One standard deviation of each number of `initial_state`, where it was estimated from the recording."""
+    recording: str = ""
+    """Name of the recording that this is a window of; empty: the episode is a recording of its own."""
 
     def track(self, name: str) -> Track:
         for track in self.tracks:
@@ -204,6 +257,16 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class SignalGap:
+    """The same of one signal, in its own unit."""
+
+    rms: float
+    unit: str
+    parts: Mapping[str, float] = field(default_factory=dict)
+    """By joint, where it is of several."""
+
+
+@dataclass(frozen=True)
 class Gap:
     """Difference between simulated and recorded trajectories for one model on one set of episodes."""
 
@@ -211,6 +274,7 @@ class Gap:
     """Mean trajectory difference by factor: sum over the cell's control steps of the 2-norm [m]."""
     rmse_m: float
     """Root mean square distance over all frames and objects [m]."""
+    signals: Mapping[str, SignalGap] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,15 @@ HOPELESS = 1e9
 a simulator that has lost a body is never mistaken for one that agrees."""
 
 
+Difference = Callable[[Floats, Floats], Floats]
+"""(..., C) predicted, (..., C) measured -> (..., C) how far apart, on the manifold of each signal."""
+
+
+def plain_difference(predicted: Floats, measured: Floats) -> Floats:
+    """The difference of numbers that are what they are."""
+    return np.asarray(predicted - measured)
+
+
 @dataclass(frozen=True)
 class Likelihood:
     """E episodes, F frames, C observed columns, P parameters, A inputs."""
@@ -38,7 +47,7 @@ class Likelihood:
     time_s: Floats
     """(E, F) since the command."""
     measured: Floats
-    """(E, F, C), NaN where not seen."""
+    """(E, F, C), NaN where not seen; as `difference` takes it."""
     sigma: Floats
     """(E, F, C) standard deviation of one measurement, the simulator's own roughness included."""
     correlation_time: float
@@ -51,6 +60,7 @@ class Likelihood:
     """(P,)"""
     predict_alike: PredictAlike | None = None
     """The same model as `predict`: who replaces one replaces both. None: nothing is known of what rows share."""
+    difference: Difference = plain_difference
 
     @property
     def low(self) -> Floats:
@@ -107,5 +117,5 @@ class Likelihood:
 
     def _missed(self, predicted: Floats, episode: Ints) -> Floats:
         measured = self.measured[episode]
-        missed = np.nan_to_num((predicted - measured) / self.sigma[episode], nan=HOPELESS)
+        missed = np.nan_to_num(self.difference(predicted, measured) / self.sigma[episode], nan=HOPELESS)
         return np.where(np.isnan(measured), 0.0, np.clip(missed, -HOPELESS, HOPELESS))

@@ -9,9 +9,10 @@ import numpy as np
 
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.fields import parse, rows, rows_of
-from compass_ros.cells.spec import ActionSpec, ObjectSpec, ParameterSpec
+from compass_ros.cells.signals import Signal
+from compass_ros.cells.spec import ActionSpec, ParameterSpec
 from compass_ros.errors import ConfigError
-from compass_ros.types import QUANTITY_SIZE, Bools, Floats, Ints
+from compass_ros.types import Bools, Floats, Ints
 
 _FREE, _SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
@@ -49,32 +50,37 @@ class Command:
 
 
 class Start:
-    """The first state of one object, from the inputs."""
+    """The first state of one object or signal, from the inputs."""
 
-    def __init__(self, model: mujoco.MjModel, obj: ObjectSpec, column: int, where: str) -> None:
-        self._quantity, self.column = obj.quantity, column
-        here, name = f"{where}: start: {obj.name}", obj.body or obj.name
-        if obj.quantity == "joint":
-            self._qpos, self._qvel = (int(rows(model, kind, name, here)[0]) for kind in ("qpos", "dof"))
+    def __init__(self, model: mujoco.MjModel, signal: Signal, column: int, where: str) -> None:
+        self._signal, self.column = signal, column
+        here, name = f"{where}: start: {signal.name}", signal.at[0]
+        if signal.jointed:
+            self._joints, self._rates = (
+                np.array([rows(model, kind, joint, here)[0] for joint in signal.at]) for kind in ("qpos", "dof")
+            )
             return
+        if not signal.places:
+            raise ConfigError(f"{here}: a {signal.quantity} does not say where anything is")
         body = int(rows(model, "body", name, here)[0])
         joints = range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body])
         kinds = [int(model.jnt_type[j]) for j in joints]
         self._free = kinds == [_FREE]
-        if not kinds or not (self._free or (set(kinds) == {_SLIDE} and obj.quantity != "pose")):
-            wanted = "a free joint" if obj.quantity == "pose" else "a free joint or slide joints"
+        if not kinds or not (self._free or (set(kinds) == {_SLIDE} and signal.quantity != "pose")):
+            wanted = "a free joint" if signal.quantity == "pose" else "a free joint or slide joints"
             raise ConfigError(f"{here}: body '{name}' needs {wanted} to start where it was measured")
         self._qpos, self._qvel = int(model.jnt_qposadr[joints[0]]), int(model.jnt_dofadr[joints[0]])
         self._axes, self._rest = _frame(model, body, joints)
 
     def write(self, inputs: Floats, positions: Floats, velocities: Floats) -> None:
         state = inputs[:, self.column :]
-        if self._quantity == "joint":
-            positions[:, self._qpos], velocities[:, self._qvel] = state[:, 0], state[:, 1]
+        if self._signal.jointed:
+            count = len(self._joints)
+            positions[:, self._joints], velocities[:, self._rates] = state[:, :count], state[:, count : 2 * count]
             return
-        size = min(QUANTITY_SIZE[self._quantity], 3)
+        size = min(self._signal.size, 3)
         at = self._qpos + np.arange(size)
-        if self._quantity == "pose":
+        if self._signal.quantity == "pose":
             positions[:, at] = state[:, :3]
             positions[:, self._qpos + 3 : self._qpos + 7] = _turned(state[:, 3:7], state[:, 13:16])
             velocities[:, self._qvel : self._qvel + 6] = state[:, 7:13]
@@ -141,17 +147,15 @@ def offsets(cell: Cell, parameter: int, spec: ParameterSpec, starts: dict[str, i
     """Bind `observed_offset[i]` of objects; `starts`: first column of each object's first state. Raises ConfigError."""
     here = f"{cell.path}: {spec.name}"
     index = parse(spec.field, here)[1] or 0
-    known = [o.name for o in cell.objects]
+    known = [s.name for s in cell.signals]
     chosen = [one.strip() for one in spec.of.split(",")] if spec.of else known
     unknown = sorted(set(chosen) - set(known))
     if unknown:
         raise ConfigError(f"{here}: of: unknown object {', '.join(unknown)}; known: {', '.join(known)}")
-    out, column = [], 0
-    for o in cell.objects:
-        size = QUANTITY_SIZE[o.quantity]
-        if o.name in chosen:
-            if index >= size:
-                raise ConfigError(f"{here}: '{o.name}' has {size} numbers, found index {index}")
-            out.append(Offset(parameter, column + index, starts[o.name] + index if o.name in starts else None))
-        column += size
+    out = []
+    for s in cell.signals:
+        if s.name in chosen:
+            if index >= s.size:
+                raise ConfigError(f"{here}: '{s.name}' has {s.size} numbers, found index {index}")
+            out.append(Offset(parameter, s.first + index, starts[s.name] + index if s.name in starts else None))
     return out

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from compass_ros.cells.signals import Signal, of_object, of_spec
 from compass_ros.cells.spec import CellSpec, FactorSpec, ObjectSpec
-from compass_ros.cells.start import first_state, input_names, input_std
+from compass_ros.cells.start import StartSpec, first_state, input_names, input_std
 from compass_ros.errors import ConfigError, nearest
-from compass_ros.types import QUANTITY_SIZE, ActionField, Episode, Floats, Parameter, Quantity
+from compass_ros.types import ActionField, Bools, Episode, Floats, Parameter
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,32 @@ class Cell:
 
     @property
     def horizon(self) -> int:
-        """Control steps of an episode."""
-        return self.spec.horizon
+        """Control steps of an episode, or of a window."""
+        windows = self.spec.windows
+        return self.spec.horizon if windows is None else max(round(windows.length_s / self.control_dt), 1)
+
+    @cached_property
+    def signals(self) -> tuple[Signal, ...]:
+        """Objects, then signals, with their columns of an observation."""
+        out: list[Signal] = []
+        for o in self.spec.objects:
+            out.append(of_object(o.name, o.quantity, o.body, o.topic, _end(out)))
+        for s in self.spec.signals:
+            out.append(of_spec(s, _end(out)))
+        return tuple(out)
+
+    def signal(self, name: str) -> Signal:
+        """An object or signal by its name."""
+        return next(s for s in self.signals if s.name == name)
+
+    @cached_property
+    def starts(self) -> tuple[StartSpec, ...]:
+        """What begins where it was seen; of windows, without being told: joints, or bodies where no joint is seen."""
+        if self.spec.start or self.spec.windows is None:
+            return self.spec.start
+        placed = [s for s in self.signals if s.places and s.fitted]
+        joints = [s for s in placed if s.jointed]
+        return tuple(StartSpec(object=s.name) for s in joints or placed)
 
     @property
     def duration(self) -> float:
@@ -63,7 +88,15 @@ class Cell:
 
     @cached_property
     def factors(self) -> tuple[FactorSpec, ...]:
-        return tuple(FactorSpec(name=f, object=f) if isinstance(f, str) else f for f in self.spec.factors)
+        if self.spec.factors:
+            return tuple(FactorSpec(name=f, object=f) if isinstance(f, str) else f for f in self.spec.factors)
+        out: list[FactorSpec] = []
+        for s in self.signals:
+            several = s.jointed and s.size > 1
+            parts = s.numbers if several else ("all",)
+            names = [f"{s.name}.{part}" if several else s.name for part in parts]
+            out += [FactorSpec(name=n, object=s.name, part=p) for n, p in zip(names, parts, strict=True) if s.fitted]
+        return tuple(out)
 
     @cached_property
     def defaults(self) -> Floats:
@@ -78,31 +111,51 @@ class Cell:
     @cached_property
     def channels(self) -> tuple[str, ...]:
         """(C,) object of each column of an observation."""
-        return tuple(o.name for o in self.objects for _ in range(QUANTITY_SIZE[o.quantity]))
+        return tuple(s.name for s in self.signals for _ in range(s.size))
+
+    @cached_property
+    def fitted(self) -> Bools:
+        """(C,) whether a column is of what parameters are fitted to."""
+        return np.concatenate([np.full(s.size, s.fitted) for s in self.signals])
 
     @cached_property
     def input_names(self) -> tuple[str, ...]:
-        """(A,) what `inputs` holds: the action's fields, first states as `object.vx`, `release`."""
+        """(A,) what `inputs` holds: the action's fields, first states as `object.vx`, `release`, `window`.
+
+        The last is the number of the episode's recorded inputs among those that the simulator was given.
+        """
         names = tuple(a.name for a in self.action)
-        for spec in self.spec.start:
-            names += input_names(spec, self.quantity(spec.object))
-        return names + (("release",) if self.spec.release else ())
+        for spec in self.starts:
+            names += input_names(spec, self.signal(spec.object))
+        return names + (("release",) if self.spec.release else ()) + (("window",) if self.spec.inputs else ())
 
     @cached_property
     def launch_std(self) -> Floats:
-        """(A,) standard deviation of each input around what was commanded or measured; 0 = exact."""
-        std = [self.spec.launch_noise.get(a.name, 0.0) for a in self.action]
-        for spec in self.spec.start:
-            std += input_std(spec, self.quantity(spec.object))
-        return np.array(std + ([self.spec.release.noise_s] if self.spec.release else []))
+        """(A,) standard deviation of each input around what was commanded or measured.
 
-    def quantity(self, name: str) -> Quantity:
-        """What is tracked of an object."""
-        return next(o.quantity for o in self.objects if o.name == name)
+        0 = exact, NaN: the recording says it (`stated_std`).
+        """
+        std: list[float] = [self.spec.launch_noise.get(a.name, 0.0) for a in self.action]
+        for spec in self.starts:
+            std += input_std(spec, self.signal(spec.object), self.spec.windows is not None)
+        std += [self.spec.release.noise_s] if self.spec.release else []
+        return np.array(std + [0.0] * bool(self.spec.inputs))
+
+    def stated_std(self, episode: Episode) -> Floats:
+        """(A,) the same as the recording says it; 0 where it says nothing."""
+        std, at = np.zeros(len(self.input_names)), len(self.action)
+        for spec in self.starts:
+            stated = episode.initial_std.get(spec.object, ())
+            std[at : at + len(stated)] = stated
+            at += len(input_names(spec, self.signal(spec.object)))
+        return std
 
     def simulated_time(self, inputs: Floats, time_s: Floats) -> Floats:
         """(B, F) times since the release for (B, F) times since the start and (B, A) inputs; before it, negative."""
-        return np.asarray(time_s - inputs[:, -1:]) if self.spec.release else time_s
+        if not self.spec.release:
+            return time_s
+        release = self.input_names.index("release")
+        return np.asarray(time_s - inputs[:, release : release + 1])
 
     def index(self, parameter: str) -> int:
         """Position of a parameter. Raises ConfigError with the nearest known name."""
@@ -130,6 +183,12 @@ class Cell:
                 f"episode {episode.name}: action has no {missing}; expected {[a.name for a in self.action]}"
             )
         rows = [np.array([episode.action[a.name] for a in self.action], float)]
-        rows += [first_state(spec, self.quantity(spec.object), episode) for spec in self.spec.start]
+        rows += [first_state(spec, self.signal(spec.object), episode) for spec in self.starts]
         rows += [np.array([self.spec.release.default_s])] if self.spec.release else []
+        rows += [np.zeros(1)] if self.spec.inputs else []
         return np.concatenate(rows)
+
+
+def _end(signals: list[Signal]) -> int:
+    """First column after these."""
+    return signals[-1].columns.stop if signals else 0

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from compass_ros.cells.auto import with_auto
 from compass_ros.cells.cell import Cell
+from compass_ros.cells.drives import Drives
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.cells.scene_files import scene_files
 from compass_ros.cells.spec import validated_spec
@@ -37,7 +38,7 @@ def load(name_or_path: str | Path, parameters: Parameters = "cell") -> Cell:
     if not model.is_file():
         raise ConfigError(f"{path}: model: no file {model}")
     cell = Cell(spec, path, _hash(path, model))
-    dynamics_of(cell)
+    Drives(cell, dynamics_of(cell).model)
     return with_auto(cell) if spec.auto or parameters == "auto" else cell
 
 

@@ -12,7 +12,8 @@
 | `command_scale` | actuator | share of the command that arrives |
 | `table_friction`, `table_creep`, `table_load` | body | Coulomb friction of a body that slides on a table, as a force |
 | `start_qpos[i]`, `start_qvel[i]` | joint | added to the first position or velocity of every episode |
-| `observed_offset[i]` | object | added to a tracked number: bias of a camera or encoder |
+| `observed_offset[i]` | object, signal | added to a tracked number: bias of a camera or encoder |
+| `input_delay_s[i]`, `input_scale[i]`, `input_offset[i]` | input | how late it acts; a factor; what is added after it |
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ from compass_ros.cells.made_drives import Writer, command, strength, whole_comma
 from compass_ros.errors import ConfigError
 from compass_ros.types import Floats
 
-OUTSIDE = ("table_friction", "table_creep", "table_load", "start_qpos", "start_qvel", "observed_offset")
+OUTSIDE = ("table_friction", "table_creep", "table_load", "start_qpos", "start_qvel", "observed_offset",
+           "input_delay_s", "input_scale", "input_offset")  # fmt: skip
 """Made fields that act outside of the model."""
 
 

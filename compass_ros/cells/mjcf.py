@@ -11,13 +11,13 @@ from compass_ros.cells.bindings import Command, Start, offsets, shift
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.dynamics import Sliding
 from compass_ros.cells.fields import Fields, names, rows
-from compass_ros.cells.keyframe import STATE, begun, first_state, place_mocap
-from compass_ros.cells.spec import ObjectSpec, ParameterSpec
+from compass_ros.cells.keyframe import begun, first_state, place_mocap
+from compass_ros.cells.sensors import add_sensors, columns_of
+from compass_ros.cells.spec import ParameterSpec
 from compass_ros.cells.start import input_names
-from compass_ros.errors import ConfigError, nearest
-from compass_ros.types import QUANTITY_SIZE, Floats, Ints
+from compass_ros.errors import ConfigError
+from compass_ros.types import Floats, Ints
 
-_FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 _NUDGE_M = 1e-9
 _TABLE = {"table_friction": None, "table_creep": 0.002, "table_load": 1.0}
 """Fields of a sliding body, with what is taken where the YAML has none."""
@@ -40,7 +40,7 @@ class Mjcf:
         self._fields = Fields(self._model, list(enumerate(cell.spec.parameters)), self._where)
         self._commands = [Command(self._model, i, a, self._where) for i, a in enumerate(cell.spec.action)]
         self._starts = _starts(cell, self._model)
-        self._columns = np.concatenate([_columns(self._model, o, self._where) for o in cell.objects]).astype(np.int64)
+        self._columns = np.concatenate([columns_of(self._model, s, self._where) for s in cell.signals]).astype(np.int64)
         self._sliding = _table_fields(self._model, cell.spec.parameters, self._where)
         numbered = list(enumerate(cell.spec.parameters))
         self._shifts = [shift(self._model, i, p, self._where) for i, p in numbered if p.field.startswith("start_")]
@@ -113,10 +113,10 @@ class Mjcf:
 def _starts(cell: Cell, model: mujoco.MjModel) -> dict[str, Start]:
     """First states by object, in the order of the inputs."""
     out, column = {}, len(cell.action)
-    for spec in cell.spec.start:
-        obj = next(o for o in cell.objects if o.name == spec.object)
-        out[obj.name] = Start(model, obj, column, str(cell.path))
-        column += len(input_names(spec, obj.quantity))
+    for spec in cell.starts:
+        signal = cell.signal(spec.object)
+        out[signal.name] = Start(model, signal, column, str(cell.path))
+        column += len(input_names(spec, signal))
     return out
 
 
@@ -133,31 +133,6 @@ def _table_fields(model: mujoco.MjModel, parameters: Sequence[ParameterSpec], wh
     return out
 
 
-def _columns(model: mujoco.MjModel, obj: ObjectSpec, where: str) -> Ints:
-    """Where an object's numbers stand in a row of (qpos, qvel, act, sensordata)."""
-    name, size = obj.body or obj.name, QUANTITY_SIZE[obj.quantity]
-    if obj.quantity == "joint":
-        return rows(model, "qpos", name, f"{where}: objects: {obj.name}")[:1]
-    free = _free_address(model, name)
-    if free is not None:
-        return np.arange(free, free + size)
-    first = mujoco.mj_stateSize(model, STATE) - 1
-    position = first + int(model.sensor(_sensor(obj, "position")).adr[0])
-    orientation = first + int(model.sensor(_sensor(obj, "orientation")).adr[0])
-    return np.concatenate([position + np.arange(min(size, 3)), orientation + np.arange(size - min(size, 3))])
-
-
-def _free_address(model: mujoco.MjModel, body: str) -> int | None:
-    identity = model.body(body).id
-    first = int(model.body_jntadr[identity])
-    free = model.body_jntnum[identity] == 1 and int(model.jnt_type[first]) == _FREE
-    return int(model.jnt_qposadr[first]) if free else None
-
-
-def _sensor(obj: ObjectSpec, what: str) -> str:
-    return f"compass/{obj.name}/{what}"
-
-
 def _compiled(cell: Cell) -> tuple[mujoco.MjModel, Ints]:
     """The scene, with sensors for what is tracked, and the tendons whose spring rests at the length that is drawn.
 
@@ -168,18 +143,7 @@ def _compiled(cell: Cell) -> tuple[mujoco.MjModel, Ints]:
         nominal = spec.compile()
     except ValueError as error:
         raise ConfigError(f"{cell.model_path}: {' '.join(str(error).split())}") from error
-    bodies = names(nominal, mujoco.mjtObj.mjOBJ_BODY)
-    for obj in cell.objects:
-        name = obj.body or obj.name
-        if obj.quantity == "joint":
-            continue
-        if name not in bodies:
-            hint = nearest(name, bodies)
-            raise ConfigError(f"{cell.path}: objects: the scene has no body '{name}'; it has {', '.join(bodies)}{hint}")
-        for what, kind in (("position", "FRAMEPOS"), ("orientation", "FRAMEQUAT")):
-            sensor = spec.add_sensor()
-            sensor.name, sensor.type = _sensor(obj, what), getattr(mujoco.mjtSensor, f"mjSENS_{kind}")
-            sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_XBODY, name
+    add_sensors(spec, nominal, cell.signals, str(cell.path))
     simple = _tuned_though_simple(nominal, cell.spec.parameters)
     for name in simple:
         _nudge(spec.body(name), nominal.body(name))

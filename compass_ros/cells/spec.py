@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Literal
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as validated
 
-from compass_ros.cells.start import Name, ReleaseSpec, StartSpec
+from compass_ros.cells.series import InputSpec, Name, SignalSpec, WindowSpec, check_series
+from compass_ros.cells.start import ReleaseSpec, StartSpec
 from compass_ros.errors import ConfigError, nearest, shown
 from compass_ros.types import Quantity
 
@@ -37,8 +37,10 @@ class FactorSpec:
 
     name: Name
     object: Name
-    part: Literal["all", "position", "orientation", "roll", "pitch", "yaw"] = "all"
-    """Which numbers of the object's row."""
+    """An object, or a signal."""
+    part: Name = "all"
+    """Which numbers of its row: `all`, of a pose `position`, `orientation`, `roll`, `pitch`, `yaw`, of a signal of
+    joints one of its joints."""
 
 
 @validated(frozen=True, config=_strict, kw_only=True)
@@ -88,10 +90,19 @@ class CellSpec:
     name: Name
     dynamics: Name
     model: Name
-    control_dt_s: float = Field(gt=0)
-    horizon: int = Field(ge=1)
-    objects: tuple[ObjectSpec, ...]
-    factors: tuple[Name | FactorSpec, ...]
+    control_dt_s: float = Field(0.05, gt=0)
+    """Between two moments at which trajectories are compared for the trajectory difference."""
+    horizon: int = Field(0, ge=0)
+    """How many of them; with `windows` it follows from their length."""
+    objects: tuple[ObjectSpec, ...] = ()
+    signals: tuple[SignalSpec, ...] = ()
+    """What was measured; an object is a short form for the pose of a body or the position of a joint."""
+    inputs: tuple[InputSpec, ...] = ()
+    """Recorded series that drive the simulation."""
+    windows: WindowSpec | None = None
+    """How long recordings are cut; None: an episode is compared from its start on, for `horizon` steps."""
+    factors: tuple[Name | FactorSpec, ...] = ()
+    """Empty: one for each object, and for each joint of each fitted signal."""
     parameters: tuple[ParameterSpec, ...] = ()
     action: tuple[ActionSpec, ...] = ()
     noise_m: float = Field(0.001, gt=0)
@@ -115,12 +126,28 @@ def validated_spec(content: Mapping[str, object], where: str) -> CellSpec:
         first = next((e for e in found if e["type"] == _UNKNOWN), found[0])  # a misspelt name also lacks the right one
         name = ".".join(str(part) for part in first["loc"])
         specs = (CellSpec, ParameterSpec, ActionSpec, ObjectSpec, FactorSpec, StartSpec, ReleaseSpec)
-        known = [f.name for spec in specs for f in fields(spec)]
+        known = [f.name for spec in (*specs, InputSpec, SignalSpec, WindowSpec) for f in fields(spec)]
         hint = nearest(name.rsplit(".", 1)[-1], known) if first["type"] == _UNKNOWN else ""
         raise ConfigError(f"{where}: {name}: {first['msg']}, found {shown(first['input'])}{hint}") from error
     _check_values(spec, where)
     _check_names(spec, where)
+    _check_measured(spec, where)
+    check_series(spec.inputs, spec.signals, where)
     return spec
+
+
+def _check_measured(spec: CellSpec, where: str) -> None:
+    """Something is measured, and for how long is said once."""
+    if not (spec.objects or spec.signals):
+        raise ConfigError(f"{where}: objects, signals: both empty; say what was measured")
+    if not spec.objects and not any(s.fitted for s in spec.signals):
+        raise ConfigError(f"{where}: signals: none is fitted")
+    if spec.windows is None and spec.horizon < 1:
+        raise ConfigError(f"{where}: horizon: missing; say how many steps of control_dt_s an episode has, or `windows`")
+    if spec.windows is not None and spec.horizon:
+        raise ConfigError(f"{where}: horizon, windows: one of them; windows of {spec.windows.length_s:g} s say it")
+    if spec.windows is not None and (spec.action or spec.release):
+        raise ConfigError(f"{where}: windows: an `action` or `release` begins an episode, and a window is cut anywhere")
 
 
 def _check_values(spec: CellSpec, where: str) -> None:
@@ -136,11 +163,21 @@ def _check_values(spec: CellSpec, where: str) -> None:
             raise ConfigError(f"{where}: action {a.name}: reach {list(a.reach)} does not hold [{a.low:g}, {a.high:g}]")
 
 
+def _parts(measured: ObjectSpec | SignalSpec) -> tuple[str, ...]:
+    """What a factor can be of it."""
+    if measured.quantity == "pose":
+        return ("all", "position", "orientation", "roll", "pitch", "yaw")
+    return ("all", "position", *(measured.of if isinstance(measured, SignalSpec) else ()))
+
+
 def _check_names(spec: CellSpec, where: str) -> None:
     """Names stand once, and what refers to a name finds it."""
-    parameters, objects = [p.name for p in spec.parameters], {o.name: o for o in spec.objects}
+    parameters = [p.name for p in spec.parameters]
+    measured: tuple[ObjectSpec | SignalSpec, ...] = (*spec.objects, *spec.signals)
+    objects = {one.name: one for one in measured}
     actions, factors = [a.name for a in spec.action], [f if isinstance(f, str) else f.name for f in spec.factors]
-    everything = {"parameters": parameters, "objects": [o.name for o in spec.objects], "action": actions}
+    everything = {"parameters": parameters, "action": actions, "inputs": [i.name for i in spec.inputs]}
+    everything |= {"objects and signals": [one.name for one in measured]}
     starts = [s.object for s in spec.start]
     for section, names in (everything | {"factors": factors, "start": starts}).items():
         twice = sorted({n for n in names if names.count(n) > 1})
@@ -150,7 +187,7 @@ def _check_names(spec: CellSpec, where: str) -> None:
         name = f if isinstance(f, str) else f.object
         if name not in objects:
             raise ConfigError(f"{where}: factors: unknown object '{name}'; known: {[*objects]}{nearest(name, objects)}")
-        if not isinstance(f, str) and f.part not in ("all", "position") and objects[name].quantity != "pose":
+        if not isinstance(f, str) and f.part not in _parts(objects[name]):
             kind = objects[name].quantity
             raise ConfigError(f"{where}: factors: {f.name}: '{name}' is tracked as {kind}, without {f.part}")
     for start in spec.start:

@@ -7,6 +7,7 @@ small rotation vector.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
@@ -15,6 +16,8 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 from scipy.spatial.transform import Rotation
 
+from compass_ros.cells.series import Name
+from compass_ros.cells.signals import Signal
 from compass_ros.errors import DataError
 from compass_ros.types import Episode, Floats, Quantity, Track
 
@@ -22,9 +25,11 @@ STATE: Mapping[Quantity, tuple[str, ...]] = {
     "joint": ("angle", "rate"),
     "xy": ("x", "y", "vx", "vy"),
     "xyz": ("x", "y", "z", "vx", "vy", "vz"),
+    "position": ("x", "y", "z", "vx", "vy", "vz"),
     "pose": ("x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"),
 }
-"""Numbers of a first state [m, m/s, rad, rad/s]; w: angular velocity in the body's frame, as MuJoCo has it."""
+"""Numbers of a first state [m, m/s, rad, rad/s]; w: angular velocity in the body's frame, as MuJoCo has it. Of a signal
+of joints: all angles, then all rates."""
 TURN = ("rx", "ry", "rz")
 """Rotation vector [rad] in the body's frame, after the first orientation of a pose; 0 as measured."""
 _GROUPS: Mapping[str, tuple[str, ...]] = {
@@ -33,10 +38,10 @@ _GROUPS: Mapping[str, tuple[str, ...]] = {
     "orientation": TURN,
     "rate": ("wx", "wy", "wz"),
 }
+_UNIT = ("qw", "qx", "qy", "qz")
+"""Numbers of an orientation: it is moved by a rotation vector instead."""
 _NS = 1e-9
 Deviation = Annotated[float, Field(ge=0)]
-Name = Annotated[str, Field(max_length=200)]
-"""Short enough for a message."""
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"), kw_only=True)
@@ -46,10 +51,11 @@ class StartSpec:
     object: Name
     velocity: Literal["track", "rest"] = "track"
     """Where the recording states no first velocity: from the first frames of the track, or zero."""
-    frames: int = Field(5, ge=2)
+    frames: int = Field(default=5, ge=2)
     """Frames of the track from which a first velocity is taken."""
-    noise: Mapping[Literal["position", "velocity", "orientation", "rate"], Deviation] = Field(default_factory=dict)
-    """Standard deviation of the first position [m or rad], velocity [m/s or rad/s], orientation [rad], rate [rad/s]."""
+    noise: Mapping[Literal["position", "velocity", "orientation", "rate"], Deviation] | None = None
+    """Standard deviation of the first position [m or rad], velocity [m/s or rad/s], orientation [rad], rate [rad/s].
+    None: as exact as the frames around the start of a window say (windows), else exact."""
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"), kw_only=True)
@@ -60,38 +66,53 @@ class ReleaseSpec:
     noise_s: Deviation = 0.0
 
 
-def input_names(spec: StartSpec, quantity: Quantity) -> tuple[str, ...]:
+def input_names(spec: StartSpec, signal: Signal) -> tuple[str, ...]:
     """Names of an object's inputs: its state, then the rotation vector of a pose."""
-    return tuple(f"{spec.object}.{name}" for name in _names(quantity))
+    return tuple(f"{spec.object}.{name}" for name in _names(signal))
 
 
-def input_std(spec: StartSpec, quantity: Quantity) -> tuple[float, ...]:
-    """Standard deviation of each of these inputs."""
-    of_name = {name: spec.noise.get(group, 0.0) for group, names in _GROUPS.items() for name in names}  # type: ignore[call-overload]
-    return tuple(float(of_name.get(name, 0.0)) for name in _names(quantity))
+def input_std(spec: StartSpec, signal: Signal, stated: bool) -> tuple[float, ...]:
+    """Standard deviation of each of these inputs; NaN where the recording states it."""
+    if spec.noise is None:
+        return tuple(math.nan if stated and name not in _UNIT else 0.0 for name in _names(signal))
+    given: Mapping[str, float] = dict(spec.noise)  # type: ignore[arg-type]
+    of_name = {name: given.get(group, 0.0) for group, names in _GROUPS.items() for name in names}
+    return tuple(float(of_name.get(name.rpartition(".")[2], 0.0)) for name in _names(signal))
 
 
-def _names(quantity: Quantity) -> tuple[str, ...]:
-    return STATE[quantity] + (TURN if quantity == "pose" else ())
+def state_names(signal: Signal) -> tuple[str, ...]:
+    """Numbers of the first state of what a signal tracks."""
+    if signal.quantity == "joint_position":
+        return tuple(f"{joint}.{what}" for what in STATE["joint"] for joint in signal.numbers)
+    return STATE[signal.quantity]
 
 
-def first_state(spec: StartSpec, quantity: Quantity, episode: Episode) -> Floats:
+def positions_in_state(signal: Signal) -> int:
+    """How many of them are positions; they come first."""
+    return 7 if signal.quantity == "pose" else signal.size
+
+
+def _names(signal: Signal) -> tuple[str, ...]:
+    return state_names(signal) + (TURN if signal.quantity == "pose" else ())
+
+
+def first_state(spec: StartSpec, signal: Signal, episode: Episode) -> Floats:
     """The inputs of an object at the start of an episode.
 
     What the recording states as initial state goes first; what it leaves out comes from the track. Raises DataError.
     """
     stated = np.array(episode.initial_state.get(spec.object, ()), float)
-    size = len(STATE[quantity])
-    moving = size - {"joint": 1, "xy": 2, "xyz": 3, "pose": 6}[quantity]
+    names = state_names(signal)
+    size, moving = len(names), positions_in_state(signal)
     if len(stated) not in (0, moving, size):
         raise DataError(
             f"{episode.source or episode.name}: initial state of {spec.object}: expected {moving} or {size} numbers "
-            f"({', '.join(STATE[quantity])}), found {len(stated)}"
+            f"({', '.join(names)}), found {len(stated)}"
         )
-    state = stated if len(stated) == size else _from_track(spec, quantity, episode, stated)
-    if quantity == "pose":
+    state = stated if len(stated) == size else _from_track(spec, signal.quantity, episode, stated)
+    if signal.quantity == "pose":
         state[3:7] = _unit(state[3:7], spec, episode)
-    return np.concatenate([state, np.zeros(len(TURN) if quantity == "pose" else 0)])
+    return np.concatenate([state, np.zeros(len(TURN) if signal.quantity == "pose" else 0)])
 
 
 def _unit(quaternion: Floats, spec: StartSpec, episode: Episode) -> Floats:

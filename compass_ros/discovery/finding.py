@@ -183,8 +183,8 @@ class Finding:
         """rms distance on held-out episodes [m], each with the launch that agrees best with it."""
         judged = likelihood.on(self.judge)
         inputs = judged.inputs + with_launches(judged, values).launch
-        missed = judged.predict(np.tile(values, (len(inputs), 1)), inputs, judged.time_s) - judged.measured
-        return rms_distance(self.simulator.cell, missed)
+        predicted = judged.predict(np.tile(values, (len(inputs), 1)), inputs, judged.time_s)
+        return rms_distance(self.simulator.cell, judged.difference(predicted, judged.measured))
 
     def _floor(self, noise: Noise) -> float:
         return rms_distance(self.simulator.cell, noise.rms[None, None])

@@ -80,7 +80,7 @@ def impulses(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> Impulses
     predicted, _ = pushed.observe_alike(
         np.repeat(values, episodes, axis=0), inputs[index], likelihood.time_s[index], index, np.repeat(until, episodes)
     )
-    there = np.nan_to_num((predicted - likelihood.measured[index]) / likelihood.sigma[index])
+    there = np.nan_to_num(likelihood.difference(predicted, likelihood.measured[index]) / likelihood.sigma[index])
     there = there.reshape(len(values), episodes, -1)
     change = (there[1:] - there[0]) / size
     base = np.tile(fit.point.values, (episodes, 1))

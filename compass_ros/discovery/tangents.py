@@ -91,6 +91,6 @@ def changes(space: Space, candidate: Candidate, numbers: Floats) -> Floats:
     inputs = np.tile(likelihood.inputs + point.launch, (len(numbers), 1))
     index = np.tile(np.arange(episodes), len(numbers))
     predicted = with_it.observe(np.repeat(values, episodes, axis=0), inputs, likelihood.time_s[index])
-    there = np.nan_to_num((predicted - likelihood.measured[index]) / likelihood.sigma[index])
+    there = np.nan_to_num(likelihood.difference(predicted, likelihood.measured[index]) / likelihood.sigma[index])
     change = there.reshape(len(numbers), episodes, -1) - space.fit.linear.residual.reshape(episodes, -1)
     return np.asarray((change * space.weight).reshape(len(numbers), -1).T)

@@ -10,11 +10,12 @@ import mujoco
 import numpy as np
 
 from compass_ros.cells import Cell
+from compass_ros.cells.drives import Drive, Drives
 from compass_ros.cells.dynamics import Dynamics
 from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.effect import Context, Sample, restore
 from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.types import QUANTITY_SIZE, Floats, Parameter
+from compass_ros.types import Floats, Parameter
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,9 @@ class Physics:
     cell: Cell
     dynamics: Dynamics
     effects: tuple[Attached, ...]
+    drives: Drives
+    bank: tuple[Drive, ...] = ()
+    """Recorded inputs; the input `window` says which of them a rollout has."""
 
     def __post_init__(self) -> None:
         for attached in self.effects:
@@ -67,13 +71,14 @@ class Physics:
         """What the hooks of an effect are told."""
         planes: list[tuple[int, int]] = []
         positions: list[int] = []
-        column = 0
-        for spec in self.cell.objects:
-            size = QUANTITY_SIZE[spec.quantity]
-            positions.extend(range(column, column + min(size, 3)))
-            if spec.quantity != "joint":
-                planes.append((column, column + 1))
-            column += size
+        for signal in self.cell.signals:
+            if not signal.places:
+                continue
+            positions.extend(
+                range(signal.first, signal.first + (signal.size if signal.jointed else min(signal.size, 3)))
+            )
+            if not signal.jointed:
+                planes.append((signal.first, signal.first + 1))
         sliding = {s.body: s for s in self.dynamics.sliding(self.of_cell(values))}
         return Context(attached.objects, sliding, tuple(planes), tuple(positions), self.time_step)
 
@@ -109,15 +114,21 @@ class Physics:
         return start
 
     def controls(self, values: Floats, inputs: Floats, steps: int) -> Floats | None:
-        """(B, T, nu) controls as the arm follows them; None where nothing is actuated."""
-        if not self.model.nu:
+        """(B, T, n) what drives MuJoCo (`drives.parts`), controls as the arm follows them; None where nothing does."""
+        if not self.drives.size:
             return None
-        controls = self.dynamics.controls(self.of_cell(values), self.of_command(inputs), steps)
+        nu, command = self.model.nu, self.of_command(inputs)
+        driven = self.dynamics.controls(self.of_cell(values), command, steps)
+        if self.cell.spec.inputs:
+            driven = self.drives.fill(driven, self.of_cell(values), command, self.bank, self.time_step)
+        controls = driven[..., :nu]
         drawn = list(inputs[:, len(self.cell.input_names) :, None].transpose(1, 0, 2))
         for attached, numbers in self.of_effects(values):
             if attached.effect.controls is not None:
                 own = drawn.pop(0) if attached.effect.scattered and drawn else numbers
                 controls = attached.effect.controls(controls, own, self.context(attached, values))
+        if driven.shape[2] > nu:
+            controls = np.concatenate([controls, driven[..., nu:]], axis=2)
         return np.ascontiguousarray(controls)
 
     def duration(self, values: Floats, inputs: Floats, time_s: Floats) -> float:

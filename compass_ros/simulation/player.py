@@ -44,7 +44,9 @@ class Player:
         models = self.written(physics, values)
         mujoco.set_mjcb_time(None)  # MuJoCo's profiler, on since an MjData was made, costs a quarter of a rollout
         with Programs(models, physics.terms(values)):
-            states, sensors = self._pool.rollout(models, self._data, start, controls, nstep=steps)
+            states, sensors = self._pool.rollout(
+                models, self._data, start, controls, control_spec=physics.drives.parts, nstep=steps
+            )
         self.rollouts += len(values)
         self.simulated_seconds += len(values) * steps * physics.time_step
         return states, sensors

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from compass_ros.cells import Cell
+from compass_ros.cells.drives import Drive
+from compass_ros.cells.signals import Signal
 from compass_ros.errors import DataError
 from compass_ros.simulation.factors import factor_distance
+from compass_ros.simulation.manifold import apart, charted
 from compass_ros.simulation.simulator import Simulator
-from compass_ros.types import QUANTITY_SIZE, Bools, Episode, Floats, Gap, Ints, Track
+from compass_ros.simulation.windows import drive
+from compass_ros.types import Bools, Episode, Floats, Gap, Ints, SignalGap, Track
 
 _NS = 1e-9
 STILL_S = 0.6
@@ -37,10 +41,24 @@ class Recordings:
     """(E, S, C) measured, linearly interpolated at the control times."""
     stated: Floats
     """(C,) typical standard deviation of a position as the sensor states it [m]; -inf where it does not."""
+    start_std: Floats
+    """(A,) standard deviation of the first states as the recordings say it; 0 where they say nothing."""
+    drives: tuple[Drive, ...] = ()
+    """Recorded inputs of each episode; empty where the cell has none."""
+    recording: tuple[str, ...] = ()
+    """(E,) of which recording each episode is a window; its own name where it is none."""
+
+    def numbered(self, first: int) -> Recordings:
+        """The same with recorded inputs numbered from `first` on, for a simulator that was given others before."""
+        if not self.drives:
+            return self
+        inputs = self.inputs.copy()
+        inputs[:, -1] = first + np.arange(len(inputs))
+        return replace(self, inputs=inputs)
 
 
 def recordings(cell: Cell, episodes: Sequence[Episode]) -> Recordings:
-    """Arrange episodes for a cell. Raises DataError where an episode lacks an object of the cell."""
+    """Arrange episodes (or windows) for a cell. Raises DataError where an episode lacks an object of the cell."""
     if not episodes:
         raise DataError(f"no episodes to compare with {cell.name}")
     rows = [_arrange(cell, episode) for episode in episodes]
@@ -53,43 +71,52 @@ def recordings(cell: Cell, episodes: Sequence[Episode]) -> Recordings:
     at_steps = np.stack([_at(steps, time, values) for time, values in rows])
     inputs = np.stack([cell.inputs(episode) for episode in episodes])
     stated = np.nanmedian(np.stack([_stated(cell, episode) for episode in episodes]), axis=0)
-    return Recordings(tuple(e.name for e in episodes), inputs, time_s, measured, steps, at_steps, stated)
+    return Recordings(
+        names=tuple(e.name for e in episodes),
+        inputs=inputs,
+        time_s=time_s,
+        measured=measured,
+        steps_s=steps,
+        at_steps=at_steps,
+        stated=stated,
+        start_std=np.median(np.stack([cell.stated_std(episode) for episode in episodes]), axis=0),
+        drives=tuple(drive(cell, episode) for episode in episodes) if cell.spec.inputs else (),
+        recording=tuple(e.recording or e.name for e in episodes),
+    ).numbered(0)
 
 
 def _arrange(cell: Cell, episode: Episode) -> tuple[Floats, Floats]:
     """(F,) times and (F, C) measurements on the union of the tracks' stamps, up to the cell's horizon."""
     known = {track.object: track for track in episode.tracks}
-    missing = [o.name for o in cell.objects if o.name not in known or len(known[o.name].stamp_ns) < 2]
+    missing = [s.name for s in cell.signals if s.name not in known or len(known[s.name].stamp_ns) < 2]
     if missing:
         raise DataError(f"{episode.source or episode.name}: no track of {', '.join(missing)}; has {sorted(known)}")
-    stamps = np.unique(np.concatenate([known[o.name].stamp_ns for o in cell.objects]))
+    stamps = np.unique(np.concatenate([known[s.name].stamp_ns for s in cell.signals]))
     time = (stamps - episode.start_ns) * _NS
     keep = (time >= -STILL_S) & (time <= cell.duration + 1e-6)
     stamps, time = stamps[keep], time[keep]
     if np.sum(time >= 0) < 2:
         raise DataError(f"{episode.source or episode.name}: no frames within {cell.duration:g} s after the command")
     values = np.full((len(stamps), len(cell.channels)), np.nan)
-    column = 0
-    for spec in cell.objects:
-        track, size = known[spec.name], QUANTITY_SIZE[spec.quantity]
+    for signal in cell.signals:
+        track = known[signal.name]
         inside = np.isin(track.stamp_ns, stamps) & _seen(track)
-        values[np.searchsorted(stamps, track.stamp_ns[inside]), column : column + size] = track.value[inside]
-        if np.sum(~np.isnan(values[time >= 0, column])) < 2:
+        values[np.searchsorted(stamps, track.stamp_ns[inside]), signal.columns] = track.value[inside]
+        if np.sum(~np.isnan(values[time >= 0, signal.columns]), axis=0).min() < 2:
             where = episode.source or episode.name
-            raise DataError(f"{where}: {spec.name} was not seen within {cell.duration:g} s after the command")
-        if spec.quantity == "pose":
-            _follow(values[:, column + 3 : column + 7])
-        column += size
+            raise DataError(f"{where}: {signal.name} was not seen within {cell.duration:g} s after the command")
+        if signal.quantity == "pose":
+            _follow(values[:, signal.first + 3 : signal.first + 7])
     return time, values
 
 
 def _stated(cell: Cell, episode: Episode) -> Floats:
     """(C,) median of the tracks' standard deviations; -inf where the sensor says nothing, or speaks of no position."""
     stated: list[float] = []
-    for spec in cell.objects:
-        std = episode.track(spec.name).std
-        size = QUANTITY_SIZE[spec.quantity]
-        stated += [-np.inf if std is None or i >= 3 else float(np.median(std)) for i in range(size)]
+    for signal in cell.signals:
+        std = episode.track(signal.name).std
+        known = signal.size if signal.jointed else 3
+        stated += [-np.inf if std is None or i >= known else float(np.median(std)) for i in range(signal.size)]
     return np.array(stated)
 
 
@@ -140,23 +167,54 @@ class Replay:
         episodes = np.arange(len(self.data.names))
         tiled = np.tile(values, (len(episodes), 1))
         d = self.differences(tiled, episodes).mean(axis=0)
-        missed = self.predict(tiled, episodes) - self.data.measured
-        names = [f.name for f in self.simulator.cell.factors]
-        return Gap(dict(zip(names, d.tolist(), strict=True)), rms_distance(self.simulator.cell, missed))
+        cell = self.simulator.cell
+        missed = apart(cell, self.predict(tiled, episodes), charted(cell, self.data.measured))
+        of_factor = dict(zip([f.name for f in cell.factors], d.tolist(), strict=True))
+        return Gap(of_factor, rms_distance(cell, missed), by_signal(self.simulator, missed))
 
 
 def rms_distance(cell: Cell, missed: Floats) -> float:
     """Root mean square distance of positions over all frames and objects, for (E, F, C) differences, NaN where none."""
-    own = [list(columns) for columns in positions(cell).values()]
-    distance2 = np.concatenate([np.sum(missed[:, :, columns] ** 2, axis=2).ravel() for columns in own])
-    return float(np.sqrt(np.nanmean(distance2)))
+    return _rms(missed, positions(cell).values())
+
+
+def _rms(missed: Floats, groups: Iterable[range]) -> float:
+    """Root mean square over all frames and groups of the 2-norm of each group's columns of (E, F, C) differences."""
+    distance2 = [np.sum(missed[:, :, list(group)] ** 2, axis=2).ravel() for group in groups]
+    return float(np.sqrt(np.nanmean(np.concatenate(distance2))))
+
+
+def by_signal(simulator: Simulator, missed: Floats) -> dict[str, SignalGap]:
+    """The same by signal, and in it by joint, each in its unit; a pose's orientation stands beside its position."""
+    out = {}
+    for signal, units in simulator.units.items():
+        for name, columns in parts(signal).items():
+            own = range(signal.first + columns.start, signal.first + columns.stop)
+            groups = [range(c, c + 1) for c in own] if signal.jointed else [own]
+            joints = dict(zip(signal.numbers, (_rms(missed, [g]) for g in groups), strict=False))
+            out[name] = SignalGap(_rms(missed, groups), units[columns.start], joints if len(groups) > 1 else {})
+    return out
+
+
+def parts(signal: Signal) -> dict[str, range]:
+    """Numbers of a signal that have one unit, by what they are called."""
+    if signal.quantity == "pose":
+        return {signal.name: range(3), f"{signal.name} orientation": range(3, 6)}
+    if signal.quantity == "wrench":
+        return {signal.name: range(3), f"{signal.name} torque": range(3, 6)}
+    return {signal.name: range(signal.size)}
 
 
 def positions(cell: Cell) -> dict[str, range]:
-    """Columns of an observation that hold the position of each object (a joint's: its angle), orientations left out."""
-    out, column = {}, 0
-    for spec in cell.objects:
-        size = QUANTITY_SIZE[spec.quantity]
-        out[spec.name] = range(column, column + min(size, 3))
-        column += size
+    """Columns of an observation whose 2-norm says how far off a fitted object or joint is, orientations left out.
+
+    Where nothing that is fitted says where anything is, all that is fitted counts.
+    """
+    fitted = [s for s in cell.signals if s.fitted]
+    out: dict[str, range] = {}
+    for s in [s for s in fitted if s.places] or fitted:
+        if s.quantity == "joint_position" or not s.places:
+            out |= {f"{s.name}.{number}": range(s.first + i, s.first + i + 1) for i, number in enumerate(s.numbers)}
+        else:
+            out[s.name] = range(s.first, s.first + min(s.size, 3))
     return out

@@ -10,7 +10,10 @@ import mujoco
 import numpy as np
 
 from compass_ros.cells import Cell
+from compass_ros.cells.drives import Drive, Drives
 from compass_ros.cells.registry import dynamics_of
+from compass_ros.cells.sensors import units_of
+from compass_ros.cells.signals import Signal
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.alike import roll_alike
 from compass_ros.simulation.effects.attached import Attached
@@ -51,7 +54,7 @@ class Simulator:
         dynamics = dynamics_of(cell)
         for name, value in (options or {}).items():
             setattr(dynamics.model.opt, name, value)
-        self.physics = Physics(cell, dynamics, tuple(effects))
+        self.physics = Physics(cell, dynamics, tuple(effects), Drives(cell, dynamics.model))
         self._player = Player(dynamics.model, threads)
 
     @property
@@ -82,6 +85,12 @@ class Simulator:
         other.physics = replace(self.physics, effects=tuple(effects))
         return other
 
+    def driven(self, bank: Sequence[Drive]) -> Simulator:
+        """The same with recorded inputs, of which the input `window` names one. Shares what `with_effects` shares."""
+        other = copy.copy(self)
+        other.physics = replace(self.physics, bank=tuple(bank))
+        return other
+
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The cell's parameters, then the quantities of each effect as `objects@effect@quantity`."""
@@ -96,10 +105,15 @@ class Simulator:
         """(E, A) inputs of the cell with a column of zeros for each scattered effect: an episode's own number of it."""
         return np.pad(commanded, ((0, 0), (0, sum(a.effect.scattered for a in self.effects))))
 
-    def launch_std(self, values: Floats) -> Floats:
-        """(A,) standard deviation of each of these inputs around what was commanded, at (P,) values."""
+    def launch_std(self, values: Floats, stated: Floats | None = None) -> Floats:
+        """(A,) standard deviation of each of these inputs around what was commanded, at (P,) values.
+
+        `stated`: what the recordings say (`Recordings.start_std`) where the cell leaves it to them.
+        """
         own = [n[0, 0] for a, n in self.physics.of_effects(values[None]) if a.effect.scattered]
-        return np.append(self.cell.launch_std, own)
+        of_cell = self.cell.launch_std
+        left = np.isnan(of_cell)
+        return np.append(np.where(left, 0.0 if stated is None else stated, of_cell), own)
 
     @property
     def time_step(self) -> float:
@@ -118,13 +132,16 @@ class Simulator:
     @property
     def unit(self) -> Unit:
         """Of a distance between two states: rad where all that is tracked are hinges."""
-        tracked = [spec.body or spec.name for spec in self.cell.objects if spec.quantity == "joint"]
-        hinges = [name for name in tracked if self.physics.model.joint(name).type[0] == mujoco.mjtJoint.mjJNT_HINGE]
-        return "rad" if len(hinges) == len(self.cell.objects) else "m"
+        return "rad" if {u for s, units in self.units.items() for u in units if s.places} == {"rad"} else "m"
+
+    @property
+    def units(self) -> dict[Signal, tuple[str, ...]]:
+        """(D,) unit of each number of each signal."""
+        return {s: units_of(self.physics.model, s, str(self.cell.path)) for s in self.cell.signals}
 
     def movers(self) -> tuple[str, ...]:
         """Tracked bodies that slide in the plane and tracked joints: what a force along the way can act on."""
-        names = [spec.body or spec.name for spec in self.cell.objects]
+        names = dict.fromkeys(name for signal in self.cell.signals if signal.places for name in signal.at)
         return tuple(name for name in names if slides_or_turns(self.physics.model, name))
 
     def walls(self) -> tuple[str, ...]:

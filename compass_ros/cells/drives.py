@@ -1,0 +1,179 @@
+"""Recorded inputs as what MuJoCo is driven with: controls, joint forces, wrenches and mocap poses at each time step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from compass_ros.cells.cell import Cell
+from compass_ros.cells.fields import rows
+from compass_ros.cells.series import InputSpec, Numbers
+from compass_ros.errors import ConfigError, nearest
+from compass_ros.types import Floats, Ints
+
+_STATE = mujoco.mjtState
+_PARTS = (_STATE.mjSTATE_CTRL, _STATE.mjSTATE_QFRC_APPLIED, _STATE.mjSTATE_XFRC_APPLIED, _STATE.mjSTATE_MOCAP_POS,
+          _STATE.mjSTATE_MOCAP_QUAT)  # fmt: skip
+"""In the order in which MuJoCo packs them."""
+_OF_TARGET = {"ctrl": 0, "qfrc": 1, "xfrc": 2, "mocap": 3}
+FIELDS = {"input_delay_s": "delay_s", "input_scale": "scale", "input_offset": "offset"}
+"""Parameters of an input, and the number of its YAML that each takes the place of."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The recorded inputs of one episode or window, one for each input of the cell."""
+
+    time_s: tuple[Floats, ...]
+    """(n,) each, since its start, increasing."""
+    value: tuple[Floats, ...]
+    """(n, D) each, without gaps."""
+
+
+class Drives:
+    """The inputs of a cell, bound to its scene. Raises ConfigError where they name what the scene lacks."""
+
+    def __init__(self, cell: Cell, model: mujoco.MjModel) -> None:
+        where = str(cell.path)
+        _check_parameters(cell, where)
+        self._column = cell.input_names.index("window") if cell.spec.inputs else -1
+        used = {0} if model.nu else set()
+        for spec in cell.spec.inputs:
+            used.add(_OF_TARGET[spec.to])
+            used |= {4} if spec.to == "mocap" else set()
+        self._offsets: dict[int, int] = {}
+        self.size, parts = 0, 0
+        for i in sorted(used):
+            self._offsets[i] = self.size
+            self.size += mujoco.mj_stateSize(model, _PARTS[i].value)
+            parts |= _PARTS[i].value
+        self.parts = parts
+        """mjtState bits of a row of controls."""
+        self._rest = _at_rest(model, self._offsets, self.size)
+        self._bound = [_Bound(cell, spec, self._places(model, spec, where), where) for spec in cell.spec.inputs]
+
+    def fill(self, controls: Floats, values: Floats, inputs: Floats, bank: Sequence[Drive], time_step: float) -> Floats:
+        """(B, T, size) what drives MuJoCo: (B, T, nu) controls with the recorded inputs of each row's window in place.
+
+        (B, P) values of the cell's parameters, (B, A) inputs; the last of these says which Drive of the bank. Without a
+        bank nothing is recorded, and what is driven rests.
+        """
+        batch, steps, nu = controls.shape
+        out = np.empty((batch, steps, self.size))
+        out[:] = self._rest
+        out[..., :nu] = controls
+        window = inputs[:, self._column].astype(int)
+        edges = time_step * np.arange(steps + 1)
+        for i, bound in enumerate(self._bound if bank else ()):
+            bound.write(out, values, window, [d.time_s[i] for d in bank], [d.value[i] for d in bank], edges)
+        return out
+
+    def _places(self, model: mujoco.MjModel, spec: InputSpec, where: str) -> Ints:
+        """(D,) places of the numbers in a row of controls."""
+        here, part = f"{where}: inputs: {spec.name}", _OF_TARGET[spec.to]
+        kind = {"ctrl": "actuator", "qfrc": "dof"}.get(spec.to, "body")
+        if part <= 1:
+            found = [int(rows(model, kind, target, here)[0]) for target in spec.targets]
+            return np.array(found, dtype=np.int64) + int(self._offsets[part])
+        body = int(rows(model, "body", spec.at[0], here)[0])
+        if spec.to == "xfrc":
+            return np.arange(6, dtype=np.int64)[: len(spec.numbers)] + int(self._offsets[part] + 6 * body)
+        mocap = int(model.body_mocapid[body])
+        if mocap < 0:
+            raise ConfigError(f"{here}: body '{spec.at[0]}' is no mocap body")
+        position = np.arange(3, dtype=np.int64) + int(self._offsets[3] + 3 * mocap)
+        turn = np.arange(4, dtype=np.int64) + int(self._offsets[4] + 4 * mocap)
+        return np.concatenate([position, turn])[: len(spec.numbers)]
+
+
+class _Bound:
+    """One input: where it goes, and which parameters move it."""
+
+    def __init__(self, cell: Cell, spec: InputSpec, places: Ints, where: str) -> None:
+        self._spec, self._places = spec, places
+        self._numbers = {name: _Number(cell, spec, name, getattr(spec, name), where) for name in FIELDS.values()}
+
+    def write(
+        self, out: Floats, values: Floats, window: Ints, time_s: list[Floats], value: list[Floats], edges: Floats
+    ) -> None:
+        delay, scale, offset = (self._numbers[name].of(values) for name in ("delay_s", "scale", "offset"))
+        # Rows of one window with one delay share their series: of a Jacobian's rows nearly all do.
+        keys, which = np.unique(np.column_stack([window, delay]), axis=0, return_inverse=True)
+        for k, key in enumerate(keys):
+            own = int(key[0])
+            held = _held(time_s[own], value[own], edges, key[1:], self._spec.hold == "linear")
+            chosen = np.flatnonzero(which.ravel() == k)
+            out[np.ix_(chosen, np.arange(out.shape[1]), self._places)] = (
+                held * scale[chosen][:, None] + offset[chosen][:, None]
+            )
+
+
+class _Number:
+    """Delay, scale or offset of an input: what the YAML says, or parameters of the cell."""
+
+    def __init__(self, cell: Cell, spec: InputSpec, name: str, given: Numbers, where: str) -> None:
+        size = len(spec.numbers)
+        self._fixed = np.broadcast_to(np.asarray(given, float), size).copy()
+        self._parameter = np.full(size, -1)
+        for p, parameter in enumerate(cell.spec.parameters):
+            field, _, index = parameter.field.rstrip("]").partition("[")
+            if FIELDS.get(field) != name or parameter.of != spec.name:
+                continue
+            if index and int(index) >= size:
+                raise ConfigError(f"{where}: {parameter.name}: '{spec.name}' has {size} numbers, found index {index}")
+            self._parameter[int(index) if index else slice(None)] = p
+
+    def of(self, values: Floats) -> Floats:
+        """(B, D) for (B, P) values."""
+        return np.where(self._parameter >= 0, values[:, np.maximum(self._parameter, 0)], self._fixed)
+
+
+def _held(time_s: Floats, value: Floats, edges: Floats, delay: Floats, linear: bool) -> Floats:
+    """(T, D) of a series, each number late by its delay: its mean over each time step.
+
+    The mean and not the value at the beginning: so a delay of a part of a step counts, and motion is smooth in it.
+    Before the first stamp and after the last the series holds.
+    """
+    out = np.empty((len(edges) - 1, value.shape[1]))
+    for delayed in np.unique(delay):
+        columns = np.flatnonzero(delay == delayed)
+        at = edges - delayed
+        if linear:
+            middle = 0.5 * (at[1:] + at[:-1])
+            for c in columns:
+                out[:, c] = np.interp(middle, time_s, value[:, c])
+            continue
+        known = np.concatenate([[min(time_s[0], at[0]) - 1.0], time_s, [max(time_s[-1], at[-1]) + 1.0]])
+        rows_ = np.concatenate([value[:1], value])
+        area = np.concatenate(
+            [np.zeros((1, len(columns))), np.cumsum(rows_[:, columns] * np.diff(known)[:, None], axis=0)]
+        )
+        place = np.clip(np.searchsorted(known, at, side="right") - 1, 0, len(rows_) - 1)
+        total = area[place] + (at - known[place])[:, None] * rows_[place][:, columns]
+        mean = np.diff(total, axis=0) / np.diff(at)[:, None]
+        # A step that lies between two stamps has the value itself, to the last bit.
+        same = place[1:] == place[:-1]
+        out[:, columns] = np.where(same[:, None], rows_[place[:-1]][:, columns], mean)
+    return out
+
+
+def _check_parameters(cell: Cell, where: str) -> None:
+    """Parameters of inputs name one that there is."""
+    known = [spec.name for spec in cell.spec.inputs]
+    for parameter in cell.spec.parameters:
+        if parameter.field.partition("[")[0] in FIELDS and parameter.of not in known:
+            listed = ", ".join(known) or "none"
+            said = f"the cell has no input '{parameter.of}'; it has {listed}{nearest(parameter.of, known)}"
+            raise ConfigError(f"{where}: {parameter.name}: of: {said}")
+
+
+def _at_rest(model: mujoco.MjModel, offsets: dict[int, int], size: int) -> Floats:
+    """(size,) a row of controls where nothing is driven: mocap bodies where the scene has them."""
+    data, rest = mujoco.MjData(model), np.zeros(size)
+    for part, offset in offsets.items():
+        count = mujoco.mj_stateSize(model, _PARTS[part].value)
+        mujoco.mj_getState(model, data, rest[offset : offset + count], _PARTS[part].value)
+    return rest

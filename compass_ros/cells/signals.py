@@ -1,0 +1,63 @@
+"""What is measured, in one form: objects and signals of the YAML as columns of an observation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from compass_ros.cells.series import OF_JOINTS, SignalSpec, size_of
+from compass_ros.types import NUMBERS, Quantity
+
+POSITIONS: frozenset[Quantity] = frozenset({"xy", "xyz", "position", "pose", "joint", "joint_position"})
+"""Quantities that say where something is: a first state can come from them."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One object or signal, and its columns."""
+
+    name: str
+    quantity: Quantity
+    topic: str
+    of: tuple[str, ...]
+    """What a message calls it: joints, or one frame; empty: the signal's own name."""
+    at: tuple[str, ...]
+    """Elements of the scene: joints, or one body or site."""
+    first: int
+    """First column of an observation."""
+    noise: float | None = None
+    step: float | None = None
+    fitted: bool = True
+
+    @property
+    def jointed(self) -> bool:
+        """Whether its numbers are of joints, one each."""
+        return self.quantity in OF_JOINTS or self.quantity == "joint"
+
+    @property
+    def size(self) -> int:
+        return size_of(self.quantity, self.at)
+
+    @property
+    def columns(self) -> slice:
+        return slice(self.first, self.first + self.size)
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """(D,) what its numbers are called."""
+        return self.of or self.at if self.jointed else NUMBERS[self.quantity]
+
+    @property
+    def places(self) -> bool:
+        """Whether it says where something is."""
+        return self.quantity in POSITIONS
+
+
+def of_object(name: str, quantity: Quantity, body: str, topic: str, first: int) -> Signal:
+    """An object of the short form."""
+    return Signal(name, quantity, topic, (), (body or name,), first)
+
+
+def of_spec(spec: SignalSpec, first: int) -> Signal:
+    """A signal of the YAML."""
+    at = spec.at or spec.of or (spec.name,)
+    return Signal(spec.name, spec.quantity, spec.topic, spec.of, at, first, spec.noise, spec.step, spec.fitted)

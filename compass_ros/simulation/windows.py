@@ -1,0 +1,210 @@
+"""Long recordings cut into windows, each an episode with a first state of its own: measured, and free within its noise.
+
+A robot under control forgets where it began within a second, and a passive one amplifies every error: either way a
+window of seconds says what minutes say, and a Jacobian over it stays accurate. The windows of a recording do not
+overlap.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from compass_ros.cells import Cell
+from compass_ros.cells.drives import Drive
+from compass_ros.cells.signals import Signal
+from compass_ros.cells.start import state_names
+from compass_ros.errors import DataError
+from compass_ros.types import Episode, Floats, Ints, Track
+
+AROUND_S = 0.05
+"""Frames so near the start of a window give its first state [s]: a joint's acceleration changes over that time by
+little, since the closed loops of robots have bandwidths of some hertz."""
+FEWEST, MOST = 5, 101
+"""Frames of that fit: a parabola has three numbers; beyond a hundred the rate is known better than anything else."""
+_SHORTEST = 0.5
+"""Share of a window's length that the rest of a recording must have to be a window too."""
+_MOVES = 5.0
+"""A signal moves where its range is more than this many of its standard deviations: white noise of a thousand frames
+has a range of 6.5, of which the mean absolute deviation that stands for the noise below takes no part."""
+_NS = 1e-9
+
+
+def windows(cell: Cell, episodes: Sequence[Episode]) -> list[Episode]:
+    """The windows of recordings, in order; without `windows` in the cell the recordings themselves.
+
+    Raises DataError where a recording is too short for one, or where nothing moves in any.
+    """
+    spec = cell.spec.windows
+    if spec is None:
+        return list(episodes)
+    out: list[Episode] = []
+    for episode in episodes:
+        own = list(_cut(cell, episode, spec.length_s))
+        moving = [window for window in own if _moves(cell, window)]
+        if not moving:
+            raise DataError(f"{episode.source or episode.name}: nothing moves in its {len(own)} windows")
+        out += moving
+    return out
+
+
+def drive(cell: Cell, episode: Episode) -> Drive:
+    """The recorded inputs of an episode, on its own clock. Raises DataError where one is missing."""
+    known = {track.object: track for track in episode.inputs}
+    time_s, value = [], []
+    for spec in cell.spec.inputs:
+        track = known.get(spec.name)
+        if track is None or not len(track.stamp_ns):
+            raise DataError(f"{episode.source or episode.name}: no input '{spec.name}' in it; it has {sorted(known)}")
+        time_s.append((track.stamp_ns - episode.start_ns) * _NS)
+        value.append(_without_gaps(track))
+    return Drive(tuple(time_s), tuple(value))
+
+
+def _without_gaps(track: Track) -> Floats:
+    """(F, D) each number holding its last value where a message lacked it; before the first one, the first."""
+    rows = np.arange(len(track.value))
+    out = np.empty_like(track.value)
+    for column, values in enumerate(track.value.T):
+        seen = np.flatnonzero(~np.isnan(values))
+        out[:, column] = values[seen[np.maximum(np.searchsorted(seen, rows, side="right") - 1, 0)]]
+    return out
+
+
+def _cut(cell: Cell, episode: Episode, length_s: float) -> Iterator[Episode]:
+    """Windows of one recording. Raises DataError where inputs and signals share less than half a window."""
+    series = [t for t in (*episode.tracks, *episode.inputs) if len(t.stamp_ns)]
+    begin = max(int(t.stamp_ns[0]) for t in series)
+    end = min(int(t.stamp_ns[-1]) for t in series)
+    length = round(length_s / _NS)
+    count = (end - begin) // length + ((end - begin) % length >= _SHORTEST * length)
+    if count < 1:
+        raise DataError(
+            f"{episode.source or episode.name}: all inputs and signals are there for {(end - begin) * _NS:.2f} s; "
+            f"expected at least {_SHORTEST * length_s:g} s"
+        )
+    for i in range(int(count)):
+        yield _window(cell, episode, begin + i * length, min(begin + (i + 1) * length, end))
+
+
+def _window(cell: Cell, episode: Episode, start_ns: int, end_ns: int) -> Episode:
+    """One window: its frames, what drove it before and in it, and its first state."""
+    signals = {s.object: cell.signal(s.object) for s in cell.starts}
+    around = {t.object: t for t in episode.tracks}
+    first = {name: first_state(signal, around[name], around, cell, start_ns) for name, signal in signals.items()}
+    rate = cell.spec.windows.rate_hz if cell.spec.windows else math.inf
+    tracks = tuple(_thinned(_between(t, start_ns, end_ns), rate) for t in episode.tracks)
+    return replace(
+        episode,
+        name=f"{episode.name} at {(start_ns - episode.start_ns) * _NS:.1f} s",
+        recording=episode.name,
+        start_ns=start_ns,
+        tracks=tracks,
+        initial_state={name: tuple(state.tolist()) for name, (state, _) in first.items()},
+        initial_std={name: tuple(std.tolist()) for name, (_, std) in first.items()},
+    )
+
+
+def _thinned(track: Track, rate_hz: float) -> Track:
+    """Every n-th frame, so that there are at most so many in a second."""
+    span = (track.stamp_ns[-1] - track.stamp_ns[0]) * _NS if len(track.stamp_ns) > 1 else 0.0
+    every = max(math.ceil((len(track.stamp_ns) - 1) / (span * rate_hz) - 0.01), 1) if span else 1
+    return _chosen(track, slice(None, None, every))
+
+
+def _between(track: Track, start_ns: int, end_ns: int) -> Track:
+    return _chosen(track, slice(*np.searchsorted(track.stamp_ns, [start_ns, end_ns])))
+
+
+def _chosen(track: Track, chosen: slice) -> Track:
+    return replace(
+        track,
+        stamp_ns=track.stamp_ns[chosen],
+        value=track.value[chosen],
+        std=None if track.std is None else track.std[chosen],
+    )
+
+
+def first_state(
+    signal: Signal, track: Track, tracks: dict[str, Track], cell: Cell, start_ns: int
+) -> tuple[Floats, Floats]:
+    """State of what a signal tracks at a moment, as `cells.start` orders it, and its standard deviation.
+
+    Positions and rates are those of the parabola through the frames around that moment (Savitzky and Golay 1964),
+    with the covariance of least squares; rates of joints that a velocity signal measures are the mean of that signal
+    instead. The standard deviation of an orientation and of what is turned about it is that of a rotation vector.
+    """
+    near = _near(track, start_ns)
+    time = (track.stamp_ns[near] - start_ns) * _NS
+    sigma = signal.noise or (signal.step or 0.0) / np.sqrt(12) or cell.spec.noise_m
+    powers = np.vander(time / max(float(np.abs(time).max()), 1e-9), min(3, len(time)), increasing=True)
+    solve = np.linalg.pinv(powers)
+    scale = max(float(np.abs(time).max()), 1e-9)
+    error = sigma * np.linalg.norm(solve, axis=1) / np.array([1.0, scale, scale**2])[: len(solve)]
+    value = track.value[near]
+    if signal.quantity == "pose":
+        return _first_pose(value, time, solve, scale, error)
+    fit = solve @ value
+    positions, rates = fit[0], fit[1] / scale
+    rate_std = np.full(signal.size, error[1])
+    measured = _measured_rates(signal, tracks, cell, start_ns)
+    known = ~np.isnan(measured[0])
+    rates, rate_std = np.where(known, measured[0], rates), np.where(known, measured[1], rate_std)
+    state = np.concatenate([positions, rates])
+    if len(state) != len(state_names(signal)):
+        raise DataError(f"{signal.name}: cannot begin a window with a {signal.quantity}")
+    return state, np.concatenate([np.full(signal.size, error[0]), rate_std])
+
+
+def _first_pose(value: Floats, time: Floats, solve: Floats, scale: float, error: Floats) -> tuple[Floats, Floats]:
+    fit = solve @ value[:, :3]
+    rotations = Rotation.from_quat(value[:, [4, 5, 6, 3]])
+    middle = rotations[int(np.argmin(np.abs(time)))]
+    turned = solve @ (middle.inv() * rotations).as_rotvec()
+    first = (middle * Rotation.from_rotvec(turned[0])).as_quat()[[3, 0, 1, 2]]
+    state = np.concatenate([fit[0], first, fit[1] / scale, turned[1] / scale])
+    spread = [np.full(3, error[0]), np.zeros(4), np.full(6, error[1]), np.full(3, error[0])]
+    return state, np.concatenate(spread)
+
+
+def _near(track: Track, start_ns: int) -> Ints:
+    """Frames around a moment: within AROUND_S of it, at least FEWEST and at most MOST of them."""
+    away = np.abs(track.stamp_ns - start_ns)
+    complete = ~np.isnan(track.value).any(axis=1)
+    order = np.flatnonzero(complete)[np.argsort(away[complete], kind="stable")]
+    count = int(np.clip(np.sum(away[complete] <= AROUND_S / _NS), FEWEST, MOST))
+    return np.sort(order[:count])
+
+
+def _measured_rates(signal: Signal, tracks: dict[str, Track], cell: Cell, start_ns: int) -> tuple[Floats, Floats]:
+    """(D,) rates of a signal's joints as velocity signals of the cell say them, and their noise; NaN: none does."""
+    rates, std = np.full(signal.size, np.nan), np.full(signal.size, np.nan)
+    for other in cell.signals:
+        if other.quantity != "joint_velocity" or not signal.jointed or other.noise is None:
+            continue
+        near = _near(tracks[other.name], start_ns)[:]
+        for i, joint in enumerate(signal.at):
+            if joint in other.at and len(near):
+                column = other.at.index(joint)
+                rates[i] = np.mean(tracks[other.name].value[near, column])
+                std[i] = other.noise
+    return rates, std
+
+
+def _moves(cell: Cell, window: Episode) -> bool:
+    """Whether a fitted signal moves by more than its noise: a stretch in which nothing happens is no evidence."""
+    for track in window.tracks:
+        signal = cell.signal(track.object)
+        if not signal.fitted or len(track.value) < 2:
+            continue
+        step = np.diff(track.value, axis=0)
+        noise = 1.4826 * np.nanmedian(np.abs(step - np.nanmedian(step, axis=0)), axis=0) / np.sqrt(2)
+        least = np.maximum(noise, max(signal.noise or 0.0, (signal.step or 0.0) / np.sqrt(12)))
+        span = np.nanmax(track.value, axis=0) - np.nanmin(track.value, axis=0)
+        if np.any(span > np.maximum(_MOVES * least, 1e-12)):
+            return True
+    return False
