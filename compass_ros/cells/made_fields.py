@@ -8,6 +8,7 @@
 | `contact_solref[i]`, `contact_solimp[i]` | geom | a contact pair takes the mean of its two geoms |
 | `contact_friction[i]` | geom | the same for sliding (0), turning (1) and rolling (2) friction |
 | `body_moment[axis]` | body | second moment of its mass along a principal axis: the inertia about the other two |
+| `joint_zero` | joint | what its encoder shows where the scene has the joint at zero |
 | `servo_gain` | actuator | strength of a drive: its gain, and the bias that belongs to it in proportion |
 | `command_scale` | actuator | share of the command that arrives |
 | `table_friction`, `table_creep`, `table_load` | body | Coulomb friction of a body that slides on a table, as a force |
@@ -54,6 +55,7 @@ ELEMENT = {
     "contact_solref": "geom",
     "contact_solimp": "geom",
     "contact_friction": "geom",
+    "joint_zero": "qpos",
     "servo_gain": "actuator",
     "command_scale": "actuator",
 }
@@ -65,10 +67,12 @@ TURNED = {"geom_turn": "geom_quat", "body_turn": "body_quat", "inertia_turn": "b
 def early_writers(scene: mujoco.MjModel, made: Sequence[Made], where: str) -> list[Writer]:
     """Writers that go before the plain fields, for the scene at its defaults. Raises ConfigError."""
     masses = [_mass(scene, m) for m in made if m.name == "body_mass"]
+    zeros = [_zero(scene, m) for m in made if m.name == "joint_zero"]
     moments = [_moments(scene, body, made) for body in sorted({m.row for m in made if m.name == "body_moment"})]
     scaled, driven = ([m for m in made if m.name == name] for name in ("command_scale", "servo_gain"))
     gains = [whole_command(scene, m.row, f"{where}: {m.name}") for m in scaled]
-    return masses + moments + gains + [strength(scene, m.row, m.column, f"{where}: {m.name}") for m in driven]
+    strengths = [strength(scene, m.row, m.column, f"{where}: {m.name}") for m in driven]
+    return masses + zeros + moments + gains + strengths
 
 
 def late_writers(scene: mujoco.MjModel, made: Sequence[Made], where: str) -> list[Writer]:
@@ -106,6 +110,15 @@ def _moments(scene: mujoco.MjModel, body: int, made: Sequence[Made]) -> Writer:
         more = np.zeros(3)
         more[axes] = values[columns] - nominal[axes]
         model.body_inertia[body] = inertia + (more.sum() - more)
+
+    return write
+
+
+def _zero(scene: mujoco.MjModel, made: Made) -> Writer:
+    nominal = float(scene.qpos0[made.row])
+
+    def write(model: mujoco.MjModel, values: Floats) -> None:
+        model.qpos0[made.row] = nominal + values[made.column]
 
     return write
 
