@@ -86,7 +86,8 @@ class Drives:
             raise ConfigError(f"{here}: body '{spec.at[0]}' is no mocap body")
         position = np.arange(3, dtype=np.int64) + int(self._offsets[3] + 3 * mocap)
         turn = np.arange(4, dtype=np.int64) + int(self._offsets[4] + 4 * mocap)
-        return np.concatenate([position, turn])[: len(spec.numbers)]
+        places: Ints = np.concatenate([position, turn])[: len(spec.numbers)]
+        return places
 
 
 class _Bound:
