@@ -1,4 +1,4 @@
-"""`compass record --recover`: bags that a crash cut off become whole."""
+"""`compass record`: bags that a crash cut off become whole; bags without an index get one."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from typing import Annotated
 
 import typer
 
-from compass_ros.episodes.recovery import Recovery
-
 
 def add_to(app: typer.Typer) -> None:
     app.command()(record)
@@ -16,18 +14,21 @@ def add_to(app: typer.Typer) -> None:
 
 def record(
     recover: Annotated[list[Path] | None, typer.Option(help="a bag, or a folder of bags, to make whole")] = None,
+    reindex: Annotated[
+        list[Path] | None, typer.Option(help="a whole bag, or a folder of bags, of version 0.1: add chunks and index")
+    ] = None,
 ) -> None:
-    """Make bags whole that a crash cut off. Recording itself is the node `recorder` (docs/recording.md)."""
+    """Mend bags. Recording itself is the node `recorder` (docs/recording.md)."""
+    from compass_ros.episodes import find_bags, unfinished
     from compass_ros.episodes import recover as make_whole
-    from compass_ros.episodes import unfinished
+    from compass_ros.episodes import reindex as index
 
-    if not recover:
-        raise typer.BadParameter("give --recover BAG; to record, run the node: ros2 run compass_ros recorder")
-    for path in recover:
-        bags = unfinished(path) if path.is_dir() and unfinished(path) else (path,)
-        for bag in bags:
-            typer.echo(f"{bag}: {_said(make_whole(bag))}")
-
-
-def _said(recovery: Recovery) -> str:
-    return "was whole" if recovery.was_whole else f"whole again, {recovery.messages} messages kept"
+    if not recover and not reindex:
+        raise typer.BadParameter("give --recover BAG or --reindex BAG; to record: ros2 run compass_ros recorder")
+    for path in recover or ():
+        for bag in (unfinished(path) if path.is_dir() else ()) or (path,):
+            found = make_whole(bag)
+            typer.echo(f"{bag}: {'was whole' if found.was_whole else f'whole again, {found.messages} messages kept'}")
+    for bag in find_bags(reindex or ()) if reindex else ():
+        found = index(bag)
+        typer.echo(f"{bag}: {'has its index' if found.was_whole else f'indexed, {found.messages} messages'}")

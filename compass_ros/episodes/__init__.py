@@ -14,7 +14,7 @@ from compass_ros.episodes.reader import (
     read_episode,
     read_episodes,
 )
-from compass_ros.episodes.recovery import Recovery, recover, unfinished
+from compass_ros.episodes.recovery import Recovery, recover, reindex, unfinished
 from compass_ros.episodes.sources import Source, default_sources
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "read_episode",
     "read_episodes",
     "recover",
+    "reindex",
     "unfinished",
     "write_episode",
 ]

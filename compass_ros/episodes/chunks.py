@@ -95,13 +95,18 @@ class ChunkedFile:
         self._undeclared.append(schema)
         return schema.id
 
-    def add_channel(self, topic: str, schema: int, metadata: Mapping[str, str]) -> int:
-        """Declare a topic; its number."""
-        number = len(self._channels) + 1
-        channel = Channel(id=number, topic=topic, message_encoding="cdr", metadata=dict(metadata), schema_id=schema)
+    def add_channel(self, topic: str, schema: int, encoding: str, metadata: Mapping[str, str]) -> int:
+        """Declare a topic; its number. `encoding`: of its messages."""
+        channel = Channel(
+            id=len(self._channels) + 1,
+            topic=topic,
+            message_encoding=encoding,
+            metadata=dict(metadata),
+            schema_id=schema,
+        )
         self._channels.append(channel)
         self._undeclared.append(channel)
-        return number
+        return channel.id
 
     def add_message(self, channel: int, log_ns: int, publish_ns: int, data: bytes) -> None:
         """Append a message; it is in the file when this returns."""

@@ -12,6 +12,9 @@ from compass_ros.errors import BagError
 from compass_ros.plain_yaml import LARGEST, plain_yaml
 
 FILE_NAME = "metadata.yaml"
+RECORD_NAME = "rosbag2"
+RECORD_KEY = "serialized_metadata"
+"""The metadata record of an MCAP file in which rosbag2 keeps what metadata.yaml says, for a file without its folder."""
 _KEY = "rosbag2_bagfile_information"
 
 
@@ -26,6 +29,8 @@ class TopicCount:
     messages: int
     qos: str = ""
     """The publishers' QoS profiles as a YAML list; empty when not known."""
+    encoding: str = "cdr"
+    """How the messages are serialised."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +79,15 @@ def read_summary(folder: Path) -> BagSummary:
     except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         found = " ".join(str(error).split())[:200]
         raise BagError(f"{path}: expected a rosbag2 metadata.yaml, found {type(error).__name__}: {found}") from error
+
+
+def is_record(text: str) -> bool:
+    """Whether rosbag2 reads this as its metadata record: a YAML mapping with the version at the top."""
+    try:
+        content = plain_yaml(text)
+    except (yaml.YAMLError, ValueError):
+        return False
+    return isinstance(content, dict) and "version" in content
 
 
 def _yaml(content: Mapping[str, object]) -> str:
@@ -141,7 +155,7 @@ def _topic_content(topic: TopicCount) -> Mapping[str, object]:
         "topic_metadata": {
             "name": topic.name,
             "type": topic.type,
-            "serialization_format": "cdr",
+            "serialization_format": topic.encoding,
             "offered_qos_profiles": qos_profiles(topic.qos),
             "type_description_hash": topic.digest,
         },

@@ -70,7 +70,6 @@ class Recorder:
         self._latched: dict[str, Latched] = {}
         self._sequences: dict[str, int] = {}
         self._writer: BagWriter | None = None
-        self._channels: dict[tuple[str, Definition], int] = {}
         self._losses = _Losses()
         self._start_ns = 0
         self.status = EpisodeHeader(state="finished", episode="", message=self._unfinished())
@@ -99,7 +98,7 @@ class Recorder:
             if changed:
                 change = f"{connection.topic} changed from {before.definition.type} to {connection.definition.type}"
                 self._losses.retyped.append(change)
-            self._declare(self._writer, connection)
+            _declare(self._writer, connection)
 
     def start(self, name: str, cell: str, cell_hash: str, action: Mapping[str, float], now_ns: int) -> EpisodeHeader:
         """Begin an episode; an empty name is numbered. Raises BagError: one is running, bad name, no space, exists.
@@ -113,11 +112,11 @@ class Recorder:
         if free < self._min_free_bytes:
             raise BagError(f"{self.folder}: {free / 1e6:.0f} MB left; expected {self._min_free_bytes / 1e6:.0f} MB")
         writer = BagWriter(self.folder / name)
-        self._writer, self._channels, self._losses, self._start_ns = writer, {}, _Losses(), now_ns
+        self._writer, self._losses, self._start_ns = writer, _Losses(), now_ns
         self._sequences.clear()
         self.status = EpisodeHeader("recording", name, cell, cell_hash, now_ns, bag=str(writer.folder))
         for connection in (_headers(), *self._connections.values()):
-            self._declare(writer, connection)
+            _declare(writer, connection)
         for topic, latched in self._latched.items():
             connection = self._connections[topic]
             for data, publish_ns in latched.standing(connection.latched):
@@ -126,7 +125,6 @@ class Recorder:
             _headers(), now_ns, now_ns, header_bytes(replace(self.status, bag="", topics=tuple(self._connections)))
         )
         if action:
-            self._declare(writer, _shots())
             self._write(_shots(), now_ns, now_ns, shot_bytes(Shot(now_ns, cell, action)))
         return self.progress()
 
@@ -211,15 +209,10 @@ class Recorder:
             raise BagError(f"no episode is being recorded{last}")
         return self._writer
 
-    def _declare(self, writer: BagWriter, connection: Connection) -> None:
-        key = (connection.topic, connection.definition)
-        if key not in self._channels:
-            self._channels[key] = writer.add_topic(connection.topic, connection.definition, connection.qos)
-
     def _write(self, connection: Connection, log_ns: int, publish_ns: int, data: bytes) -> None:
         try:
-            channel = self._channels[connection.topic, connection.definition]
-            self._running().write(channel, log_ns, publish_ns, data)
+            writer = self._running()
+            writer.write(_declare(writer, connection), log_ns, publish_ns, data)
         except BagError as error:
             self._fail(error)
             raise
@@ -249,6 +242,10 @@ class Recorder:
             return ""
         names = ", ".join(path.name for path in found)
         return f"bags without an end: {names}; run: compass record --recover {self.folder}"
+
+
+def _declare(writer: BagWriter, connection: Connection) -> int:
+    return writer.add_topic(connection.topic, connection.definition, connection.qos)
 
 
 def _hold(folder: Path) -> int:

@@ -1,4 +1,4 @@
-"""A bag that was cut off (recorder killed, disk full) becomes whole again: all up to the cut, nothing invented."""
+"""Bags written anew: one that was cut off becomes whole, nothing invented; one without an index gets it."""
 
 from __future__ import annotations
 
@@ -10,17 +10,24 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mcap.records import Channel, Message, Schema
+from mcap.records import Channel, Message, Metadata, Schema
 
 from compass_ros.episodes import mcap_stream, metadata, packed
 from compass_ros.episodes.bag import RawMessage, RawTopic, bag_of, decode, scan, scan_file, storage_files
-from compass_ros.episodes.definitions import EPISODE_TYPE, EPISODE_TYPES, Definition, embedded_definition
+from compass_ros.episodes.definitions import (
+    EPISODE_TYPE,
+    EPISODE_TYPES,
+    SHOT_TYPE,
+    SHOT_TYPES,
+    Definition,
+    embedded_definition,
+)
 from compass_ros.episodes.notes import EPISODE_TOPIC, EpisodeHeader, header, header_bytes
 from compass_ros.episodes.writer import BagWriter, sync_bag
 from compass_ros.errors import BagError
 
 _WORK_FOLDER = ".recovering_"
-"""Followed by the name of the file that is made whole in it."""
+"""Followed by the name of the file that is written anew in it."""
 
 
 @dataclass(frozen=True)
@@ -39,32 +46,40 @@ def recover(path: str | Path) -> Recovery:
 
     A file is replaced in one step, when its recovered copy is complete; what is whole is left as it is. Works for MCAP
     bags of one file or several, whoever recorded them, and for a bare .mcap file, which gets no metadata.yaml. Of a
-    sqlite3 bag only metadata.yaml can be missing.
+    sqlite3 bag only metadata.yaml can be missing. Messages of this package get the package's present name.
 
     Raises:
         BagError: No such bag, it is being recorded now, it holds no message, it cannot be read, or the disk is full.
     """
     bag = bag_of(Path(path))
     files = _files(bag)
-    with ExitStack() as locks:
-        for file in files:
-            locks.enter_context(_locked(file))
+    with _locked(files):
         counts = {file: _messages_if_whole(file) for file in files}
         cut = [file for file, count in counts.items() if count is None]
         described = bag.is_file() or (bag / metadata.FILE_NAME).exists()
         if described and not cut and (whole := _messages_if_whole(bag)) is not None:
             return Recovery(bag, whole, was_whole=True)
-        try:
-            _mend(cut, empty=not any(counts.values()))
-            summary = _summary(files)
-            if not summary.messages:
-                raise BagError(f"{bag}: holds no message; nothing to recover")
-            if bag.is_dir():
-                metadata.write_summary(bag, summary)
-                sync_bag(bag)
-        except OSError as error:
-            raise BagError(f"{bag}: cannot be recovered: {error.strerror}") from error
-    return Recovery(bag, summary.messages, was_whole=False)
+        kept = _written(bag, files, cut, empty=not any(counts.values()))
+    return Recovery(bag, kept, was_whole=False)
+
+
+def reindex(path: str | Path) -> Recovery:
+    """Give a whole bag chunks, a message index, and a metadata record that rosbag2 reads, which version 0.1 left out.
+
+    The messages stay as they are, in the same order, with the same stamps. Otherwise as `recover`: a file that lacks
+    nothing is left as it is (`was_whole`: all are), a sqlite3 bag too.
+
+    Raises:
+        BagError: As `recover`, and where the bag is not whole.
+    """
+    bag = bag_of(Path(path))
+    files = _files(bag)
+    with _locked(files):
+        count = sum(isinstance(item, RawMessage) for item in scan(bag))
+        plain = [file for file in files if file.suffix == ".mcap" and not _indexed(file)]
+        if not plain:
+            return Recovery(bag, count, was_whole=True)
+        return Recovery(bag, _written(bag, files, plain, empty=False), was_whole=False)
 
 
 def unfinished(folder: Path) -> tuple[Path, ...]:
@@ -85,8 +100,23 @@ def _files(bag: Path) -> list[Path]:
     return files
 
 
+def _written(bag: Path, files: Sequence[Path], anew: Sequence[Path], empty: bool) -> int:
+    """Write some of a bag's files anew, and its metadata.yaml; the number of its messages. `empty`: as in `_mend`."""
+    try:
+        _mend(anew, empty)
+        summary = _summary(files)
+        if not summary.messages:
+            raise BagError(f"{bag}: holds no message; nothing to recover")
+        if bag.is_dir():
+            metadata.write_summary(bag, summary)
+            sync_bag(bag)
+    except OSError as error:
+        raise BagError(f"{bag}: cannot be written anew: {error.strerror}") from error
+    return summary.messages
+
+
 def _mend(files: Sequence[Path], empty: bool) -> None:
-    """Give files their end, all or none; `empty`: the bag's other files hold no message.
+    """Write files anew, all or none; `empty`: the bag's other files hold no message.
 
     Raises OSError, or BagError where one is not MCAP, or no message is left.
     """
@@ -117,14 +147,34 @@ def _summary(files: Sequence[Path]) -> metadata.BagSummary:
             stamps = [min(item.log_ns, *stamps), max(item.log_ns, *stamps)] if stamps else [item.log_ns] * 2
     first, last = stamps or [0, 0]
     storage = {".mcap": "mcap", ".db3": "sqlite3"}[packed.kind(files[0])]
-    topics = tuple(metadata.TopicCount(t.name, t.type, t.digest, count, t.qos) for t, count in counts.items())
+    topics = tuple(
+        metadata.TopicCount(t.name, t.type, t.digest, count, t.qos, "ros1" if t.ros1 else "cdr")
+        for t, count in counts.items()
+    )
     names = tuple(file.name for file in files)
     return metadata.BagSummary(storage, names, first, last - first, sum(counts.values()), topics)
 
 
+def _indexed(file: Path) -> bool:
+    """Whether a whole MCAP file has an index of its messages, and no metadata record that rosbag2 cannot read."""
+    return mcap_stream.has_index(file) and all(
+        metadata.is_record(record.metadata.get(metadata.RECORD_KEY, ""))
+        for record in mcap_stream.records(file)
+        if isinstance(record, Metadata) and record.name == metadata.RECORD_NAME
+    )
+
+
 @contextmanager
-def _locked(file: Path) -> Iterator[None]:
-    """Hold the lock that a writer of this file holds."""
+def _locked(files: Sequence[Path]) -> Iterator[None]:
+    """Hold the locks that the writers of these files hold."""
+    with ExitStack() as locks:
+        for file in files:
+            locks.enter_context(_lock(file))
+        yield
+
+
+@contextmanager
+def _lock(file: Path) -> Iterator[None]:
     try:
         descriptor = os.open(file, os.O_RDONLY)
     except OSError as error:
@@ -184,9 +234,18 @@ def _copy(file: Path, writer: BagWriter) -> EpisodeHeader | None:
 
 def _declare(writer: BagWriter, channel: Channel, schema: Schema) -> tuple[int, RawTopic]:
     digest = channel.metadata.get("topic_type_hash", "")
-    definition = Definition(schema.name, schema.data.decode(), digest, schema.encoding)
-    number = writer.add_topic(channel.topic, definition, channel.metadata.get("offered_qos_profiles", ""))
-    return number, RawTopic(channel.topic, schema.name, digest)
+    definition = _present(Definition(schema.name, schema.data.decode(), digest, schema.encoding))
+    qos = channel.metadata.get("offered_qos_profiles", "")
+    number = writer.add_topic(channel.topic, definition, qos, channel.message_encoding)
+    return number, RawTopic(channel.topic, definition.type, definition.digest)
+
+
+def _present(definition: Definition) -> Definition:
+    """A message of this package under the name that the package has now, if it is the same message."""
+    for name, names in ((EPISODE_TYPE, EPISODE_TYPES), (SHOT_TYPE, SHOT_TYPES)):
+        if definition.type in names and definition.digest == embedded_definition(definition.type).digest:
+            return embedded_definition(name)
+    return definition
 
 
 def _say_recovered(writer: BagWriter, last: EpisodeHeader) -> None:

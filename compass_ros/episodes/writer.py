@@ -8,11 +8,12 @@ which `recovery.recover` makes whole. A write that fails (disk full) is taken ba
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from compass_ros.episodes.chunks import ChunkedFile
 from compass_ros.episodes.definitions import Definition
-from compass_ros.episodes.metadata import BagSummary, TopicCount, record_text, write_summary
+from compass_ros.episodes.metadata import RECORD_KEY, RECORD_NAME, BagSummary, TopicCount, record_text, write_summary
 from compass_ros.episodes.record_file import RecordFile
 from compass_ros.errors import BagError
 
@@ -49,6 +50,7 @@ class BagWriter:
         self.clock_steps = 0
         self._counts: dict[int, int] = {}
         self._topics: dict[int, TopicCount] = {}
+        self._declared: dict[tuple[str, Definition], int] = {}
         self._schemas: dict[tuple[str, str], int] = {}
         self._first_ns = 0
         self.last_ns = 0
@@ -76,15 +78,26 @@ class BagWriter:
             counts[topic.name] = counts.get(topic.name, 0) + self._counts[channel]
         return counts
 
-    def add_topic(self, name: str, definition: Definition, qos: str = "") -> int:
-        """Declare a topic and get its channel. `qos`: the publishers' profiles as a YAML list, empty when not known."""
+    def add_topic(self, name: str, definition: Definition, qos: str = "", encoding: str = "cdr") -> int:
+        """Declare a topic and get its channel; the same one, where it is declared already.
+
+        Args:
+            name: As in ROS, from the root.
+            definition: Of its messages.
+            qos: The publishers' profiles as a YAML list; empty when not known.
+            encoding: How the messages are serialised: `cdr`, or `ros1` in bags of others.
+        """
+        declared = self._declared.get((name, definition))
+        if declared is not None:
+            return declared
         key = (definition.type, definition.text)
         if key not in self._schemas:
             text = definition.text.encode()
             self._schemas[key] = self._mcap.add_schema(definition.type, definition.encoding, text)
         metadata = {"offered_qos_profiles": qos, "topic_type_hash": definition.digest}
-        channel = self._mcap.add_channel(name, self._schemas[key], metadata)
-        self._topics[channel] = TopicCount(name, definition.type, definition.digest, 0, qos)
+        channel = self._mcap.add_channel(name, self._schemas[key], encoding, metadata)
+        self._topics[channel] = TopicCount(name, definition.type, definition.digest, 0, qos, encoding)
+        self._declared[name, definition] = channel
         self._counts[channel] = 0
         return channel
 
@@ -109,13 +122,10 @@ class BagWriter:
             start_ns=self._first_ns,
             duration_ns=self.duration_ns,
             messages=self.messages,
-            topics=tuple(
-                TopicCount(topic.name, topic.type, topic.digest, self._counts[channel], topic.qos)
-                for channel, topic in self._topics.items()
-            ),
+            topics=tuple(replace(topic, messages=self._counts[channel]) for channel, topic in self._topics.items()),
         )
         try:
-            self._mcap.finish("rosbag2", {"serialized_metadata": record_text(summary)})
+            self._mcap.finish(RECORD_NAME, {RECORD_KEY: record_text(summary)})
             write_summary(self.folder, summary)
         except OSError as error:
             raise BagError(f"{self.folder}: cannot be finished: {error.strerror}") from error

@@ -52,7 +52,7 @@ def written(file: RecordFile, count: int) -> ChunkedFile:
     mcap = ChunkedFile(file, "test")
     for number, (channel, data) in enumerate(messages(count)):
         for new in {0: (1, 2), count // 2: (3,)}.get(number, ()):
-            mcap.add_channel(f"/topic{new}", mcap.add_schema(*kind(new)), {"topic_type_hash": f"RIHS01_{new}"})
+            mcap.add_channel(f"/topic{new}", mcap.add_schema(*kind(new)), "cdr", {"hash": f"RIHS01_{new}"})
         mcap.add_message(channel, number * STEP_NS, number, data)
         if isinstance(file, Watched):
             file.messages = number + 1
@@ -71,7 +71,7 @@ def written_by_mcap(count: int, chunk_sizes: list[int]) -> bytes:
             mcap.flush()  # type: ignore[no-untyped-call]
         for new in {0: (1, 2), count // 2: (3,)}.get(number, ()):
             schema = mcap.register_schema(*kind(new))
-            mcap.register_channel(f"/topic{new}", "cdr", schema, {"topic_type_hash": f"RIHS01_{new}"})
+            mcap.register_channel(f"/topic{new}", "cdr", schema, {"hash": f"RIHS01_{new}"})
         mcap.add_message(channel, number * STEP_NS, data, number, counts[channel])
         counts[channel] += 1
     mcap.flush()  # type: ignore[no-untyped-call]

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import fcntl
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
+from mcap.records import Chunk, Message
+from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import CompressionType, Writer
 from rosbags.highlevel import AnyReader
 
@@ -60,18 +64,19 @@ def test_cut_anywhere(tmp_path: Path, seed: int) -> None:
     assert digest(bag) == before
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(20))
 def test_cut_in_a_whole_bag(tmp_path: Path, seed: int) -> None:
-    """Also with the end partly there: index, metadata record, footer."""
+    """As a copy that was interrupted leaves it: in a chunk, in the index, in the metadata record, in the footer."""
     bag = write_episode(episode(), tmp_path)
     (bag / "metadata.yaml").unlink()
     file = mcap_file(bag)
-    size = file.stat().st_size
-    cut = size - 1 - int(np.random.default_rng(seed).integers(4000))
+    content = file.read_bytes()
+    ends = [content.index(item.data) + len(item.data) for item in scan(file) if isinstance(item, RawMessage)]
+    cut = int(np.random.default_rng(seed).integers(ends[0], len(content)))
     with file.open("r+b") as opened:
         opened.truncate(cut)
     kept = recover(bag).messages
-    assert 273 - 12 <= kept <= 273
+    assert kept == sum(end <= cut for end in ends)
     assert sum(topic.messages for topic in list_topics(bag)) == kept
 
 
@@ -102,23 +107,56 @@ def test_rubbish_after_the_cut_is_left_out(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("compression", [CompressionType.NONE, CompressionType.LZ4, CompressionType.ZSTD])
-def test_a_foreign_bag_with_chunks(tmp_path: Path, compression: CompressionType) -> None:
-    """As `ros2 bag record -s mcap` leaves it when it is killed: whole chunks, then a piece of one."""
+@pytest.mark.parametrize("share", [0.9, 0.6, 0.3])
+def test_a_foreign_bag_with_chunks(tmp_path: Path, compression: CompressionType, share: float) -> None:
+    """As a full disk, a copy or a power cut leaves one of `ros2 bag record`: whole chunks, then a piece of one."""
     folder = tmp_path / "foreign"
     folder.mkdir()
+    path = folder / "foreign_0.mcap"
     definition = embedded_definition(POSE_TYPE)
-    with (folder / "foreign_0.mcap").open("wb") as file:
-        writer = Writer(file, chunk_size=4000, compression=compression)
+    random = np.random.default_rng(0)
+    sent = [pose_bytes(START_NS + frame, *random.normal(size=2)) for frame in range(400)]
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=50_000, compression=compression)
         writer.start(profile="ros2", library="other")
         schema = writer.register_schema(POSE_TYPE, "ros2msg", definition.text.encode())
         channel = writer.register_channel("/pose", "cdr", schema)
-        for frame in range(100):
-            writer.add_message(channel, frame, pose_bytes(START_NS + frame, x=frame), frame)
-        size = file.tell()
-        file.truncate(size - 1)
+        for frame, data in enumerate(sent):
+            writer.add_message(channel, frame, data, frame)
+        writer.finish()  # type: ignore[no-untyped-call]
+    content = path.read_bytes()
+    cut = int(len(content) * share)
+    opened = StreamReader(BytesIO(content), emit_chunks=True).records
+    whole = sum(
+        sum(isinstance(record, Message) for record in breakup_chunk(chunk))
+        for chunk in opened
+        if isinstance(chunk, Chunk) and content.index(chunk.data) + len(chunk.data) <= cut
+    )
+    if compression is CompressionType.NONE:
+        whole = sum(content.index(data) + len(data) <= cut for data in sent)
+    path.write_bytes(content[:cut])
     found = recover(folder)
-    assert 50 < found.messages < 100
-    assert [topic.messages for topic in list_topics(folder)] == [found.messages]
+    stored = [item.data for item in scan(folder) if isinstance(item, RawMessage)]
+    assert stored == sent[: found.messages]
+    assert found.messages >= whole > 0
+    assert found.messages == whole or compression is not CompressionType.NONE
+
+
+@pytest.mark.parametrize("encoding", ["cdr", "ros1"])
+def test_the_encoding_of_messages_stays(tmp_path: Path, encoding: str) -> None:
+    folder = tmp_path / "foreign"
+    folder.mkdir()
+    with (folder / "foreign_0.mcap").open("wb") as file:
+        writer = Writer(file, use_chunking=False)
+        writer.start()
+        schema = writer.register_schema("std_msgs/String", "ros1msg", b"string data")
+        writer.add_message(writer.register_channel("/said", encoding, schema), 1, b"\0\0\0\0", 1)
+    recover(folder)
+    with mcap_file(folder).open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    assert [channel.message_encoding for channel in summary.channels.values()] == [encoding]
+    assert f"serialization_format: {encoding}\n" in (folder / "metadata.yaml").read_text()
 
 
 def test_nothing_to_recover(tmp_path: Path) -> None:
