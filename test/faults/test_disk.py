@@ -13,7 +13,7 @@ import pytest
 from compass_ros.episodes import read_episode, recover, write_episode
 from compass_ros.episodes.recording import Recorder
 from compass_ros.errors import BagError
-from test.episodes.planted import PUCK1, episode
+from test.episodes.planted import PUCK1, episode, mcap_file
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = [sys.executable, "-m", "test.faults.limited_disk"]
@@ -69,6 +69,8 @@ def test_a_full_disk(tmp_path: Path) -> None:
 def test_recovery_on_a_full_disk_loses_nothing(tmp_path: Path) -> None:
     bag = write_episode(episode(), tmp_path)
     (bag / "metadata.yaml").unlink()
+    file = mcap_file(bag)
+    os.truncate(file, file.stat().st_size - 100)
     disk, out = tmp_path / "disk", tmp_path / "out"
     disk.mkdir()
     code = f"from compass_ros.episodes import recover; recover({str(disk / 'shot')!r})"
