@@ -1,4 +1,5 @@
-# Everything from a fresh clone, on a machine with Python 3.11, gcc, cmake and make. What is already there is skipped.
+# Everything from a fresh clone, on a machine with Python 3.11, gcc, cmake and make; for the tests also Node 20 with npm.
+# What is already there is skipped.
 #
 #   make demo    the main job: a virtual robot cell plays shots, and the calibrator finds what is wrong with the simulator
 #   make test    ruff, mypy, all tests
@@ -7,7 +8,7 @@
 #   make soak    half an hour of full load: memory, lost messages, latency; ARGS="--minutes 5" for less
 #   make fuzz    100,000 damaged bags and 100,000 damaged YAML files; a nightly job. make test tries some hundreds
 #   make bench   the benchmark of methods (docs/benchmarks.md); goes on where it was stopped
-#   make lint | bags | lock | clean
+#   make lint | readers | bags | lock | clean
 #
 # ARGS are handed on:  make demo ARGS="--shots 20"
 
@@ -23,7 +24,11 @@ export MUJOCO_GL ?= disable
 SHARED := $(shell find resource config launch -type f -o -type l)
 NATIVE := $(wildcard compass_ros/simulation/native/*.c)
 
-.PHONY: demo prove real test lint bench bags install interfaces lock clean soak fuzz
+# Others' readers, to which the tests give our bags: Foxglove's, for Node, and Rerun's, whose numpy is not ours.
+READERS := test/readers
+RERUN   := .venv-rerun
+
+.PHONY: demo prove real test lint bench bags readers install interfaces lock clean soak fuzz
 .DELETE_ON_ERROR:
 
 demo: install
@@ -31,7 +36,7 @@ demo: install
 
 # Two test processes on two cores: linear algebra must not start threads of its own.
 test: export OMP_NUM_THREADS = 1
-test: lint
+test: lint readers
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not ros" $(ARGS)
 	$(BIN)/python -m pytest -m ros $(ARGS)
 
@@ -41,6 +46,17 @@ soak: install
 fuzz: install
 	$(BIN)/python -m test.faults.fuzz_bags $(ARGS)
 	$(BIN)/python -m test.faults.fuzz_yaml $(ARGS)
+
+readers: $(READERS)/node_modules/.package-lock.json $(RERUN)/.installed
+
+$(READERS)/node_modules/.package-lock.json: $(READERS)/package-lock.json
+	npm ci --prefix $(READERS) --no-audit --no-fund --loglevel error
+	@touch $@
+
+$(RERUN)/.installed: $(READERS)/requirements.txt
+	$(PYTHON) -m venv $(RERUN)
+	$(RERUN)/bin/python -m pip install --quiet --disable-pip-version-check -r $<
+	@touch $@
 
 lint: install
 	$(BIN)/ruff check .
@@ -83,6 +99,6 @@ lock:
 	$(BIN)/python scripts/lock.py > requirements.lock
 
 clean:
-	rm -rf $(VENV) build install log out .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
+	rm -rf $(VENV) $(RERUN) $(READERS)/node_modules build install log out .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
 	rm -f compass_ros/simulation/native/*.so
 	find compass_ros test scripts examples -name __pycache__ -type d -prune -exec rm -rf {} +
