@@ -105,10 +105,10 @@ class _Bound:
         keys, which = np.unique(np.column_stack([window, delay]), axis=0, return_inverse=True)
         for k, key in enumerate(keys):
             own = int(key[0])
-            held = _held(time_s[own], value[own], edges, key[1:], self._spec.hold == "linear")
+            means = held(time_s[own], value[own], edges, key[1:], self._spec.hold == "linear")
             chosen = np.flatnonzero(which.ravel() == k)
             out[np.ix_(chosen, np.arange(out.shape[1]), self._places)] = (
-                held * scale[chosen][:, None] + offset[chosen][:, None]
+                means * scale[chosen][:, None] + offset[chosen][:, None]
             )
 
 
@@ -129,10 +129,13 @@ class _Number:
 
     def of(self, values: Floats) -> Floats:
         """(B, D) for (B, P) values."""
-        return np.where(self._parameter >= 0, values[:, np.maximum(self._parameter, 0)], self._fixed)
+        out = np.tile(self._fixed, (len(values), 1))
+        tuned = np.flatnonzero(self._parameter >= 0)
+        out[:, tuned] = values[:, self._parameter[tuned]]
+        return out
 
 
-def _held(time_s: Floats, value: Floats, edges: Floats, delay: Floats, linear: bool) -> Floats:
+def held(time_s: Floats, value: Floats, edges: Floats, delay: Floats, linear: bool) -> Floats:
     """(T, D) of a series, each number late by its delay: its mean over each time step.
 
     The mean and not the value at the beginning: so a delay of a part of a step counts, and motion is smooth in it.
@@ -142,22 +145,20 @@ def _held(time_s: Floats, value: Floats, edges: Floats, delay: Floats, linear: b
     for delayed in np.unique(delay):
         columns = np.flatnonzero(delay == delayed)
         at = edges - delayed
-        if linear:
-            middle = 0.5 * (at[1:] + at[:-1])
-            for c in columns:
-                out[:, c] = np.interp(middle, time_s, value[:, c])
-            continue
         known = np.concatenate([[min(time_s[0], at[0]) - 1.0], time_s, [max(time_s[-1], at[-1]) + 1.0]])
-        rows_ = np.concatenate([value[:1], value])
-        area = np.concatenate(
-            [np.zeros((1, len(columns))), np.cumsum(rows_[:, columns] * np.diff(known)[:, None], axis=0)]
-        )
-        place = np.clip(np.searchsorted(known, at, side="right") - 1, 0, len(rows_) - 1)
-        total = area[place] + (at - known[place])[:, None] * rows_[place][:, columns]
-        mean = np.diff(total, axis=0) / np.diff(at)[:, None]
-        # A step that lies between two stamps has the value itself, to the last bit.
-        same = place[1:] == place[:-1]
-        out[:, columns] = np.where(same[:, None], rows_[place[:-1]][:, columns], mean)
+        first = np.concatenate([value[:1], value])[:, columns]
+        rise = np.zeros_like(first)
+        if linear:
+            rise[1:-1] = np.diff(value[:, columns], axis=0)
+        length = np.diff(known)[:, None]
+        area = np.concatenate([np.zeros((1, len(columns))), np.cumsum((first + 0.5 * rise) * length, axis=0)])
+        place = np.clip(np.searchsorted(known, at, side="right") - 1, 0, len(first) - 1)
+        since = (at - known[place])[:, None]
+        slope = rise[place] / length[place]
+        mean = np.diff(area[place] + (first[place] + 0.5 * slope * since) * since, axis=0) / np.diff(at)[:, None]
+        # A step that lies between two stamps has the held value itself, to the last bit.
+        kept = (place[1:] == place[:-1])[:, None] & (not linear)
+        out[:, columns] = np.where(kept, first[place[:-1]], mean)
     return out
 
 

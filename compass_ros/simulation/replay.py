@@ -42,7 +42,10 @@ class Recordings:
     stated: Floats
     """(C,) typical standard deviation of a position as the sensor states it [m]; -inf where it does not."""
     start_std: Floats
-    """(A,) standard deviation of the first states as the recordings say it; 0 where they say nothing."""
+    """(A,) standard deviation of the first states as the least sure episode says it; 0 where none says anything.
+
+    One for all, and not too small for any: the frames that follow say where a window began far better than this.
+    """
     drives: tuple[Drive, ...] = ()
     """Recorded inputs of each episode; empty where the cell has none."""
     recording: tuple[str, ...] = ()
@@ -79,7 +82,7 @@ def recordings(cell: Cell, episodes: Sequence[Episode]) -> Recordings:
         steps_s=steps,
         at_steps=at_steps,
         stated=stated,
-        start_std=np.median(np.stack([cell.stated_std(episode) for episode in episodes]), axis=0),
+        start_std=np.max([cell.stated_std(episode) for episode in episodes], axis=0),
         drives=tuple(drive(cell, episode) for episode in episodes) if cell.spec.inputs else (),
         recording=tuple(e.recording or e.name for e in episodes),
     ).numbered(0)

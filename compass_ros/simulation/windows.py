@@ -28,9 +28,9 @@ FEWEST, MOST = 5, 101
 """Frames of that fit: a parabola has three numbers; beyond a hundred the rate is known better than anything else."""
 _SHORTEST = 0.5
 """Share of a window's length that the rest of a recording must have to be a window too."""
-_MOVES = 5.0
-"""A signal moves where its range is more than this many of its standard deviations: white noise of a thousand frames
-has a range of 6.5, of which the mean absolute deviation that stands for the noise below takes no part."""
+_MOVES = 8.0
+"""A signal moves where its range is more than this many standard deviations of its noise: of windows with a thousand
+frames of white noise, one in a thousand has a range beyond 8.2."""
 _NS = 1e-9
 
 
@@ -134,49 +134,60 @@ def first_state(
 ) -> tuple[Floats, Floats]:
     """State of what a signal tracks at a moment, as `cells.start` orders it, and its standard deviation.
 
-    Positions and rates are those of the parabola through the frames around that moment (Savitzky and Golay 1964),
-    with the covariance of least squares; rates of joints that a velocity signal measures are the mean of that signal
-    instead. The standard deviation of an orientation and of what is turned about it is that of a rotation vector.
+    Positions and rates are those of the parabola through the frames around that moment (Savitzky and Golay 1964).
+    What a cubic through the same frames says differently counts as an error beside that of least squares: how a servo
+    answers to a step of its target is no parabola. Rates of joints that a velocity signal measures are that signal's
+    mean instead. The standard deviation of an orientation is that of a rotation vector.
     """
-    near = _near(track, start_ns)
-    time = (track.stamp_ns[near] - start_ns) * _NS
-    sigma = signal.noise or (signal.step or 0.0) / np.sqrt(12) or cell.spec.noise_m
-    powers = np.vander(time / max(float(np.abs(time).max()), 1e-9), min(3, len(time)), increasing=True)
-    solve = np.linalg.pinv(powers)
-    scale = max(float(np.abs(time).max()), 1e-9)
-    error = sigma * np.linalg.norm(solve, axis=1) / np.array([1.0, scale, scale**2])[: len(solve)]
-    value = track.value[near]
+    sigma = signal.noise or (signal.step or 0.0) / math.sqrt(12) or cell.spec.noise_m
     if signal.quantity == "pose":
-        return _first_pose(value, time, solve, scale, error)
-    fit = solve @ value
-    positions, rates = fit[0], fit[1] / scale
-    rate_std = np.full(signal.size, error[1])
+        return _first_pose(track, start_ns, sigma)
+    fits = [_fit(track, start_ns, sigma, [column]) for column in range(signal.size)]
+    positions, rates = (np.array([fit[0][i, 0] for fit in fits]) for i in (0, 1))
+    position_std, rate_std = (np.array([fit[1][i, 0] for fit in fits]) for i in (0, 1))
     measured = _measured_rates(signal, tracks, cell, start_ns)
     known = ~np.isnan(measured[0])
-    rates, rate_std = np.where(known, measured[0], rates), np.where(known, measured[1], rate_std)
-    state = np.concatenate([positions, rates])
+    state = np.concatenate([positions, np.where(known, measured[0], rates)])
     if len(state) != len(state_names(signal)):
         raise DataError(f"{signal.name}: cannot begin a window with a {signal.quantity}")
-    return state, np.concatenate([np.full(signal.size, error[0]), rate_std])
+    return state, np.concatenate([position_std, np.where(known, measured[1], rate_std)])
 
 
-def _first_pose(value: Floats, time: Floats, solve: Floats, scale: float, error: Floats) -> tuple[Floats, Floats]:
-    fit = solve @ value[:, :3]
+def _fit(track: Track, start_ns: int, sigma: float, columns: list[int]) -> tuple[Floats, Floats]:
+    """(2, D) value and rate at a moment of some columns together, and their standard deviations."""
+    near = _near(track, start_ns, columns)
+    time = (track.stamp_ns[near] - start_ns) * _NS
+    return _polynomial(time, track.value[near][:, columns], sigma)
+
+
+def _polynomial(time: Floats, value: Floats, sigma: float) -> tuple[Floats, Floats]:
+    """(2, D) value and rate at time 0 of (n, D) values, and their standard deviations."""
+    scale = max(float(np.abs(time).max()), 1e-9)
+    unit = np.array([[1.0], [scale]])
+    solve = [np.linalg.pinv(np.vander(time / scale, min(n, len(time)), increasing=True))[:2] for n in (3, 4)]
+    parabola, cubic = (one @ value / unit for one in solve)
+    of_noise = sigma * np.linalg.norm(solve[0], axis=1)[:, None] / unit
+    return parabola, np.hypot(of_noise, cubic - parabola)
+
+
+def _first_pose(track: Track, start_ns: int, sigma: float) -> tuple[Floats, Floats]:
+    near = _near(track, start_ns, list(range(7)))
+    time, value = (track.stamp_ns[near] - start_ns) * _NS, track.value[near]
     rotations = Rotation.from_quat(value[:, [4, 5, 6, 3]])
     middle = rotations[int(np.argmin(np.abs(time)))]
-    turned = solve @ (middle.inv() * rotations).as_rotvec()
-    first = (middle * Rotation.from_rotvec(turned[0])).as_quat()[[3, 0, 1, 2]]
-    state = np.concatenate([fit[0], first, fit[1] / scale, turned[1] / scale])
-    spread = [np.full(3, error[0]), np.zeros(4), np.full(6, error[1]), np.full(3, error[0])]
-    return state, np.concatenate(spread)
+    (place, velocity), (place_std, velocity_std) = _polynomial(time, value[:, :3], sigma)
+    (turn, rate), (turn_std, rate_std) = _polynomial(time, (middle.inv() * rotations).as_rotvec(), sigma)
+    first = (middle * Rotation.from_rotvec(turn)).as_quat()[[3, 0, 1, 2]]
+    state = np.concatenate([place, first, velocity, rate])
+    return state, np.concatenate([place_std, np.zeros(4), velocity_std, rate_std, turn_std])
 
 
-def _near(track: Track, start_ns: int) -> Ints:
+def _near(track: Track, start_ns: int, columns: list[int]) -> Ints:
     """Frames around a moment: within AROUND_S of it, at least FEWEST and at most MOST of them."""
     away = np.abs(track.stamp_ns - start_ns)
-    complete = ~np.isnan(track.value).any(axis=1)
-    order = np.flatnonzero(complete)[np.argsort(away[complete], kind="stable")]
-    count = int(np.clip(np.sum(away[complete] <= AROUND_S / _NS), FEWEST, MOST))
+    seen = np.flatnonzero(~np.isnan(track.value[:, columns]).any(axis=1))
+    order = seen[np.argsort(away[seen], kind="stable")]
+    count = int(np.clip(np.sum(away[seen] <= AROUND_S / _NS), FEWEST, MOST))
     return np.sort(order[:count])
 
 
@@ -184,14 +195,13 @@ def _measured_rates(signal: Signal, tracks: dict[str, Track], cell: Cell, start_
     """(D,) rates of a signal's joints as velocity signals of the cell say them, and their noise; NaN: none does."""
     rates, std = np.full(signal.size, np.nan), np.full(signal.size, np.nan)
     for other in cell.signals:
-        if other.quantity != "joint_velocity" or not signal.jointed or other.noise is None:
+        if other.quantity != "joint_velocity" or other.noise is None or not signal.jointed:
             continue
-        near = _near(tracks[other.name], start_ns)[:]
         for i, joint in enumerate(signal.at):
-            if joint in other.at and len(near):
+            if joint in other.at:
                 column = other.at.index(joint)
-                rates[i] = np.mean(tracks[other.name].value[near, column])
-                std[i] = other.noise
+                near = _near(tracks[other.name], start_ns, [column])
+                rates[i], std[i] = np.mean(tracks[other.name].value[near, column]), other.noise
     return rates, std
 
 
@@ -199,12 +209,16 @@ def _moves(cell: Cell, window: Episode) -> bool:
     """Whether a fitted signal moves by more than its noise: a stretch in which nothing happens is no evidence."""
     for track in window.tracks:
         signal = cell.signal(track.object)
-        if not signal.fitted or len(track.value) < 2:
-            continue
-        step = np.diff(track.value, axis=0)
-        noise = 1.4826 * np.nanmedian(np.abs(step - np.nanmedian(step, axis=0)), axis=0) / np.sqrt(2)
-        least = np.maximum(noise, max(signal.noise or 0.0, (signal.step or 0.0) / np.sqrt(12)))
-        span = np.nanmax(track.value, axis=0) - np.nanmin(track.value, axis=0)
-        if np.any(span > np.maximum(_MOVES * least, 1e-12)):
+        least = max(signal.noise or 0.0, (signal.step or 0.0) / math.sqrt(12))
+        if signal.fitted and any(_ranges(values[~np.isnan(values)], least) for values in track.value.T):
             return True
     return False
+
+
+def _ranges(values: Floats, least: float) -> bool:
+    """Whether the range of (n,) values is beyond that of noise, whose size shows between neighbours."""
+    if len(values) < 3:
+        return False
+    change = np.diff(values)
+    noise = 1.4826 * float(np.median(np.abs(change - np.median(change)))) / math.sqrt(2)
+    return bool(np.ptp(values) > max(_MOVES * max(noise, least), 1e-12))
