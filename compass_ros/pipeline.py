@@ -188,8 +188,9 @@ def assemble(
     if found.simulator is not None and found.values is not None:
         models["with_effects"] = (found.simulator, found.values)
     replays = {name: (launched(s, data, noise, v), launched(s, judge, noise, v), v) for name, (s, v) in models.items()}
+    own = (found.noise or noise).rms
     gap: dict[str, dict[str, Gap]] = {
-        name: {"fit": fit.gap(v)} | ({"held_out": unseen.gap(v)} if held_out else {})
+        name: {"fit": fit.gap(v, own)} | ({"held_out": unseen.gap(v, own)} if held_out else {})
         for name, (fit, unseen, v) in replays.items()
     }
     floor = noise_floor(cell, found.noise or noise)

@@ -262,8 +262,10 @@ class SignalGap:
 
     rms: float
     unit: str
+    floor: float = math.nan
+    """What the noise alone would leave."""
     parts: Mapping[str, float] = field(default_factory=dict)
-    """By joint, where it is of several."""
+    """rms by joint, where it is of several."""
 
 
 @dataclass(frozen=True)

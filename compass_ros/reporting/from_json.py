@@ -20,6 +20,7 @@ from compass_ros.types import (
     ParameterRow,
     Region,
     Result,
+    SignalGap,
     Together,
     Where,
 )
@@ -69,7 +70,13 @@ def _gaps(parts: Json) -> dict[Episodes, Gap]:
 
 
 def _gap(part: Json) -> Gap:
-    return Gap({factor: _number(d) for factor, d in part["d"].items()}, _number(part["rmse_m"]))
+    signals = {name: _signal(one) for name, one in part.get("signals", {}).items()}
+    return Gap({factor: _number(d) for factor, d in part["d"].items()}, _number(part["rmse_m"]), signals)
+
+
+def _signal(one: Json) -> SignalGap:
+    parts = {part: _number(rms) for part, rms in one.get("parts", {}).items()}
+    return SignalGap(_number(one["rms"]), one["unit"], _number(one["floor"]), parts)
 
 
 def _parameter(row: Json) -> ParameterRow:

@@ -35,7 +35,16 @@ def _number(value: float) -> float | None:
 def _gap(gap: Gap | None) -> dict[str, Any] | None:
     if gap is None:
         return None
-    return {"d": {factor: _number(d) for factor, d in gap.d.items()}, "rmse_m": _number(gap.rmse_m)}
+    signals = {
+        name: {
+            "rms": _number(signal.rms),
+            "unit": signal.unit,
+            "floor": _number(signal.floor),
+            "parts": {part: _number(rms) for part, rms in signal.parts.items()},
+        }
+        for name, signal in gap.signals.items()
+    }
+    return {"d": {f: _number(d) for f, d in gap.d.items()}, "rmse_m": _number(gap.rmse_m), "signals": signals}
 
 
 def _parameter(row: ParameterRow) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from compass_ros.cells.drives import Drive
 from compass_ros.cells.signals import Signal
 from compass_ros.errors import DataError
 from compass_ros.simulation.factors import factor_distance
-from compass_ros.simulation.manifold import apart, charted
+from compass_ros.simulation.manifold import apart, charted, on_manifold
 from compass_ros.simulation.simulator import Simulator
 from compass_ros.simulation.windows import drive
 from compass_ros.types import Bools, Episode, Floats, Gap, Ints, SignalGap, Track
@@ -165,15 +165,19 @@ class Replay:
         simulated = self.simulator.observe(values, self.inputs[episode], steps)
         return np.asarray(factor_distance(self.simulator.cell, simulated, self.data.at_steps[episode]).sum(axis=1))
 
-    def gap(self, values: Floats) -> Gap:
-        """How far the (P,) values are from all episodes."""
+    def gap(self, values: Floats, noise: Floats | None = None) -> Gap:
+        """How far the (P,) values are from all episodes; `noise`: (C,) rms of the measurements' own errors."""
         episodes = np.arange(len(self.data.names))
         tiled = np.tile(values, (len(episodes), 1))
         d = self.differences(tiled, episodes).mean(axis=0)
         cell = self.simulator.cell
         missed = apart(cell, self.predict(tiled, episodes), charted(cell, self.data.measured))
         of_factor = dict(zip([f.name for f in cell.factors], d.tolist(), strict=True))
-        return Gap(of_factor, rms_distance(cell, missed), by_signal(self.simulator, missed))
+        signals = by_signal(self.simulator, missed)
+        if noise is not None:
+            floors = by_signal(self.simulator, on_manifold(cell, noise)[None, None])
+            signals = {name: replace(signal, floor=floors[name].rms) for name, signal in signals.items()}
+        return Gap(of_factor, rms_distance(cell, missed), signals)
 
 
 def rms_distance(cell: Cell, missed: Floats) -> float:
@@ -191,15 +195,16 @@ def by_signal(simulator: Simulator, missed: Floats) -> dict[str, SignalGap]:
     """The same by signal, and in it by joint, each in its unit; a pose's orientation stands beside its position."""
     out = {}
     for signal, units in simulator.units.items():
-        for name, columns in parts(signal).items():
+        for name, columns in of_one_unit(signal).items():
             own = range(signal.first + columns.start, signal.first + columns.stop)
             groups = [range(c, c + 1) for c in own] if signal.jointed else [own]
             joints = dict(zip(signal.numbers, (_rms(missed, [g]) for g in groups), strict=False))
-            out[name] = SignalGap(_rms(missed, groups), units[columns.start], joints if len(groups) > 1 else {})
+            parts = joints if len(groups) > 1 else {}
+            out[name] = SignalGap(_rms(missed, groups), units[columns.start], parts=parts)
     return out
 
 
-def parts(signal: Signal) -> dict[str, range]:
+def of_one_unit(signal: Signal) -> dict[str, range]:
     """Numbers of a signal that have one unit, by what they are called."""
     if signal.quantity == "pose":
         return {signal.name: range(3), f"{signal.name} orientation": range(3, 6)}

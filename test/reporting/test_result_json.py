@@ -142,7 +142,7 @@ def test_what_is_not_finite_or_not_there_is_null(result: Result) -> None:
     assert content["parameters"][0]["std"] is None
     assert content["parameters"][0]["value"] is None
     assert content["gap"] == {
-        "nominal": {"fit": {"d": {"puck1": None}, "rmse_m": None}, "held_out": None},
+        "nominal": {"fit": {"d": {"puck1": None}, "rmse_m": None, "signals": {}}, "held_out": None},
         "calibrated": None,
         "with_effects": None,
         "noise_floor_m": None,
