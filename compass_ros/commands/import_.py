@@ -19,8 +19,10 @@ def import_(
         Path | None, typer.Option(help="folder of the data; else COMPASS_REAL_DATA or ../shared/data")
     ] = None,
 ) -> None:
-    """Turn CSV, NPZ, MAT or XLS tables into bags, one an episode."""
+    """Turn CSV, NPZ, MAT or XLSX tables into bags, one an episode."""
     from compass_ros.episodes.tables import import_tables
 
-    bags = import_tables(tables, out, data)
-    typer.echo(f"{len(bags)} bags in {out}")
+    imported = import_tables(tables, out, data)
+    for line in imported.said:
+        typer.echo(f"note: {line}", err=True)
+    typer.echo(f"{len(imported.bags)} bags in {out}")

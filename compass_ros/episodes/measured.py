@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from compass_ros.types import Bools, Floats, Quantity
 
-LEAST_NORM = 0.5
-"""Norm of a quaternion that still says an orientation: halfway between those that do (1) and one never set (0)."""
+LEAST = 0.25
+"""Largest number of a quaternion that still says an orientation: of a unit quaternion it is 0.5 or more, of one that
+was never set 0."""
+
+
+def _number(index: int) -> str:
+    return f"number {index + 1}"
 
 
 def measured(values: Floats, quantity: Quantity) -> Bools:
@@ -23,17 +30,16 @@ def oriented(values: Floats, quantity: Quantity) -> Bools:
     """(F,) whether a row's quaternion says an orientation; True for quantities without one."""
     if quantity != "pose":
         return np.ones(len(values), bool)
-    return np.asarray(~(np.linalg.norm(values[:, 3:], axis=1) < LEAST_NORM))
+    return np.asarray(~(np.abs(values[:, 3:]).max(axis=1) < LEAST))
 
 
-def left_out(values: Floats, quantity: Quantity, what: str) -> str:
+def left_out(values: Floats, quantity: Quantity, what: str, place: Callable[[int], str] = _number) -> str:
     """One sentence on the rows that are not measured; empty where all are. `what`: `messages of cube on /tf`."""
-    lost = np.flatnonzero(~measured(values, quantity))
-    if not lost.size:
+    lost = np.flatnonzero(~measured(values, quantity)).tolist()
+    if not lost:
         return ""
     unset = int(np.sum(~oriented(values[lost], quantity)))
-    why = [f"{lost.size - unset} not finite"] * (unset < lost.size) + [f"{unset} with an orientation of zeros"] * (
-        unset > 0
-    )
-    which = ", ".join(str(index + 1) for index in lost[:6]) + ", ..." * (lost.size > 6)
-    return f"{lost.size} of {len(values)} {what} are left out ({'; '.join(why)}): number {which}"
+    reasons = {"without a number": len(lost) - unset, "with an orientation of zeros": unset}
+    why = ", ".join(f"{count} {reason}" for reason, count in reasons.items() if count)
+    which = ", ".join(place(index) for index in lost[:6]) + ", ..." * (len(lost) > 6)
+    return f"{len(lost)} of {len(values)} {what} are left out ({why}): {which}"

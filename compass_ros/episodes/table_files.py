@@ -2,129 +2,156 @@
 
 from __future__ import annotations
 
-import csv
 import zipfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 import openpyxl  # type: ignore[import-untyped]
 import scipy.io
 from openpyxl.utils.exceptions import InvalidFileException  # type: ignore[import-untyped]
 
-from compass_ros.errors import DataError, nearest
+from compass_ros.episodes.delimited import read_rows
+from compass_ros.episodes.table import Table
+from compass_ros.episodes.table_rows import Row, tables_of
+from compass_ros.errors import DataError
 from compass_ros.types import Floats
 
 
 @dataclass(frozen=True)
-class Table:
-    """One table of a file."""
+class Selection:
+    """Which tables of a file."""
 
-    labels: Mapping[str, str]
-    """What tells it from the others of its file, for its name: `index` (from 1), `key`, `group`."""
-    columns: Mapping[str, Floats]
-    """(F,) by name; columns of arrays are numbered `0`, `1`, ..., after the array's name where there are several."""
-
-    def column(self, name: str, asked: str) -> Floats:
-        """Raises DataError with the place where it is asked for and the columns that there are."""
-        if name not in self.columns:
-            known = ", ".join(list(self.columns)[:20])
-            raise DataError(f"{asked}: no column '{name}'; there are {known}{nearest(name, self.columns)}")
-        return self.columns[name]
+    pattern: str = "*"
+    """Sheets, arrays; or variables side by side, `time=T state=Y`."""
+    group_by: str = ""
+    """Column whose values part the rows of a text file or sheet."""
+    header: int | None = None
+    """Line of the columns' names in a text file or sheet; 0: there is none; None: it is looked for."""
 
 
-def csv_tables(path: Path, pattern: str, group_by: str) -> Iterator[Table]:
-    """The one table of a CSV file with a header line; `group_by` parts it by the values of a column."""
-    del pattern  # a CSV file has no parts with names
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DataError(f"{path}: cannot be read as CSV: {error}") from error
-    yield from _parted(path, path.stem, [[cell.strip() for cell in row] for row in rows], group_by)
+def csv_tables(path: Path, selection: Selection) -> Iterator[Table]:
+    """The table of a text file."""
+    rows, thousands = read_rows(path)
+    yield from tables_of(rows, path.stem, path.stem, selection.group_by, selection.header, thousands)
 
 
-def xlsx_tables(path: Path, pattern: str, group_by: str) -> Iterator[Table]:
-    """The sheets whose name matches `pattern`, each with a header line; `group_by` parts them by a column's values."""
+def xlsx_tables(path: Path, selection: Selection) -> Iterator[Table]:
+    """The sheets whose name matches."""
     try:
         with path.open("rb") as file:
             book = openpyxl.load_workbook(file, data_only=True)
     except (OSError, InvalidFileException, zipfile.BadZipFile, KeyError, ValueError) as error:
-        raise DataError(f"{path}: cannot be read as an Excel workbook (.xlsx): {error}") from error
+        raise DataError(f"cannot be read as an Excel workbook (.xlsx): {error}") from error
     for sheet in book.worksheets:
-        if fnmatchcase(sheet.title, pattern):
-            yield from _parted(path, sheet.title, [list(row) for row in sheet.iter_rows(values_only=True)], group_by)
+        if fnmatchcase(sheet.title, selection.pattern):
+            lines = enumerate(sheet.iter_rows(values_only=True), sheet.min_row)
+            rows = [Row(line, cells) for line, cells in lines if any(cell not in (None, "") for cell in cells)]
+            yield from tables_of(rows, path.stem, sheet.title, selection.group_by, selection.header, thousands=",")
 
 
-def npz_tables(path: Path, pattern: str, group_by: str) -> Iterator[Table]:
-    """The 2-D arrays whose name matches `pattern`, one table each, columns numbered."""
-    del group_by  # one array, one recording
+def npz_tables(path: Path, selection: Selection) -> Iterator[Table]:
+    """The arrays whose name matches, one table each, columns numbered; or arrays side by side."""
     try:
         with np.load(path, allow_pickle=False) as arrays:
-            keys = [key for key in arrays.files if fnmatchcase(key, pattern)]
-            for index, key in enumerate(keys):
-                array = np.atleast_2d(np.asarray(arrays[key], float))
-                yield Table({"index": str(index + 1), "key": key}, {str(i): c for i, c in enumerate(array.T)})
-    except (OSError, ValueError, zipfile.BadZipFile) as error:
-        raise DataError(f"{path}: cannot be read as NPZ with arrays of numbers: {error}") from error
+            if "=" in selection.pattern:
+                yield from _side_by_side(path, arrays, _wanted(selection.pattern, arrays))
+                return
+            named = {key: arrays[key] for key in arrays.files if fnmatchcase(key, selection.pattern)}
+            numbers = {key: array for key, array in named.items() if array.ndim and array.dtype.kind in "biuf"}
+            for index, (key, array) in enumerate(numbers.items(), 1):
+                columns = {str(i): c for i, c in enumerate(np.reshape(array, (len(array), -1)).astype(float).T)}
+                yield _of_arrays(path, index, key, columns)
+    except (OSError, ValueError, TypeError, zipfile.BadZipFile) as error:
+        raise DataError(f"cannot be read as NPZ with arrays of numbers: {error}") from error
 
 
-def mat_tables(path: Path, pattern: str, group_by: str) -> Iterator[Table]:
-    """The cells of cell arrays, one table each. `pattern` names the variables side by side: `time=Time_id state=Y_id`.
+def mat_tables(path: Path, selection: Selection) -> Iterator[Table]:
+    """Variables side by side: vectors and matrices make one table, the cells of cell arrays one table each.
 
-    Columns are numbered after the names on the left (`state.0`); the longer side of a cell is taken as its samples.
+    Columns are numbered after the names on the left (`state.0`), or after the variables' own where none are given. The
+    side of a matrix that is as long as the vectors beside it, else its longer one, is taken as its samples. Fields of
+    structures are named with a point: `time=log.t`.
     """
-    del group_by
-    wanted = dict(pair.split("=", 1) for pair in pattern.split() if "=" in pair)
     try:
-        content = scipy.io.loadmat(str(path), variable_names=list(wanted.values()))
-        variables = {name: [np.asarray(cell, float) for cell in np.ravel(content[v])] for name, v in wanted.items()}
-    except KeyError as error:
-        known = ", ".join(name for name, *_ in scipy.io.whosmat(str(path)))
-        raise DataError(f"{path}: no variable {error}; it has {known}") from error
-    except (OSError, ValueError, TypeError, IndexError, NotImplementedError, scipy.io.matlab.MatReadError) as error:
-        raise DataError(f"{path}: cannot be read as MAT with cells of numbers: {error}") from error
-    for index, cells in enumerate(zip(*variables.values(), strict=True)):
-        columns: dict[str, Floats] = {}
-        for name, cell in zip(variables, cells, strict=True):
-            samples = cell if cell.shape[0] >= cell.shape[-1] else cell.T
-            columns |= {f"{name}.{i}": column for i, column in enumerate(samples.T)}
-        yield Table({"index": str(index + 1), "key": str(index + 1)}, columns)
+        content = {name: value for name, value in scipy.io.loadmat(str(path)).items() if not name.startswith("__")}
+        yield from _side_by_side(path, content, _wanted(selection.pattern, content))
+    except NotImplementedError as error:
+        hint = "save it again in MATLAB with the option '-v7': save('FILE.mat', 'VARIABLE', '-v7')"
+        raise DataError(f"MAT files of version 7.3 (HDF5) are not read; {hint}") from error
+    except (OSError, ValueError, TypeError, IndexError, scipy.io.matlab.MatReadError) as error:
+        raise DataError(f"cannot be read as MAT with numbers: {error}") from error
 
 
-FORMATS: Mapping[str, Callable[[Path, str, str], Iterator[Table]]] = {
+FORMATS: Mapping[str, Callable[[Path, Selection], Iterator[Table]]] = {
     "csv": csv_tables,
     "xlsx": xlsx_tables,
     "npz": npz_tables,
     "mat": mat_tables,
 }
+"""Each raises DataError without the file's name."""
 
 
-def _parted(path: Path, key: str, rows: Sequence[Sequence[object]], group_by: str) -> Iterator[Table]:
-    """Tables of rows below a header; rows without any value are left out."""
-    if not rows:
-        raise DataError(f"{path}: '{key}' is empty; expected a header line and rows of numbers")
-    names = [str(name).strip() for name in rows[0] if name is not None]
-    filled = [row for row in rows[1:] if any(cell not in (None, "") for cell in row)]
-    for row in filled:
-        if any(cell not in (None, "") for cell in row[len(names) :]) or len(row) < len(names):
-            raise DataError(f"{path}: '{key}' has {len(names)} columns, but a row with {len(row)}: {list(row)[:12]}")
-    if group_by and group_by not in names:
-        raise DataError(f"{path}: '{key}' has no column '{group_by}'; it has {', '.join(names)}")
-    groups: dict[str, list[Sequence[object]]] = {}
-    for row in filled:
-        groups.setdefault(str(row[names.index(group_by)]) if group_by else "1", []).append(row)
-    for index, (group, members) in enumerate(groups.items()):
-        columns = {name: _numbers(path, key, name, (row[i] for row in members)) for i, name in enumerate(names)}
-        yield Table({"index": str(index + 1), "key": key, "group": group}, columns)
+def _wanted(pattern: str, content: Mapping[str, object]) -> dict[str, str]:
+    """Variables by what they are called in the YAML: pairs NAME=VARIABLE, or patterns of the variables' own names."""
+    words = pattern.split()
+    named = dict(word.split("=", 1) for word in words if "=" in word)
+    own = [name for name in content if any(fnmatchcase(name, word) for word in words if "=" not in word)]
+    return named | {name: name for name in own if np.asarray(content[name]).dtype.kind in "biuf"}
 
 
-def _numbers(path: Path, key: str, name: str, cells: Iterable[object]) -> Floats:
-    cells = list(cells)
-    try:
-        return np.array([float(cast(str, cell)) for cell in cells])
-    except (TypeError, ValueError) as error:
-        raise DataError(f"{path}: column '{name}' of '{key}' holds something else than numbers: {error}") from error
+def _side_by_side(path: Path, content: Mapping[str, object], wanted: Mapping[str, str]) -> Iterator[Table]:
+    """One table for each recording that the variables hold."""
+    if not wanted:
+        raise DataError(f"no variables of numbers are asked for; it has {', '.join(content)}")
+    recordings = {name: _recordings(content, variable) for name, variable in wanted.items()}
+    counts = {name: len(found) for name, found in recordings.items()}
+    if len(set(counts.values())) > 1:
+        raise DataError(f"the variables hold different numbers of recordings: {counts}")
+    for index, arrays in enumerate(zip(*recordings.values(), strict=True), 1):
+        length = next((array.size for array in arrays if 1 in array.shape and array.size > 1), 0)
+        columns: dict[str, Floats] = {}
+        for name, array in zip(recordings, arrays, strict=True):
+            samples = _samples(array, length)
+            columns |= {f"{name}.{i}": column for i, column in enumerate(samples.T)}
+            if samples.shape[1] == 1:
+                columns[name] = samples[:, 0]
+        key = str(index) if max(counts.values()) > 1 else path.stem
+        yield _of_arrays(path, index, key, columns)
+
+
+def _recordings(content: Mapping[str, object], variable: str) -> list[Floats]:
+    """The matrices in a variable: itself, or its cells."""
+    first, *fields = variable.split(".")
+    if first not in content:
+        raise DataError(f"no variable '{variable}'; it has {', '.join(content)}")
+    value = np.asarray(content[first])
+    for field in fields:
+        if value.dtype.names is None or field not in value.dtype.names:
+            raise DataError(f"no field '{field}' in '{variable}'; it has {', '.join(value.dtype.names or ('none',))}")
+        value = value[field]
+        value = np.asarray(value.ravel()[0]) if value.size == 1 else value
+    return [_matrix(cell, variable) for cell in (np.ravel(value) if value.dtype == object else [value])]
+
+
+def _matrix(cell: object, variable: str) -> Floats:
+    array = np.asarray(cell, float)
+    if array.ndim > 2:
+        raise DataError(f"'{variable}' has {array.ndim} dimensions; expected vectors and matrices")
+    return array.reshape(-1, 1) if array.ndim < 2 else array
+
+
+def _samples(array: Floats, length: int) -> Floats:
+    """The matrix with its samples as rows."""
+    if length in array.shape:
+        return array if array.shape[0] == length else array.T
+    return array if array.shape[0] >= array.shape[1] else array.T
+
+
+def _of_arrays(path: Path, index: int, key: str, columns: Mapping[str, Floats]) -> Table:
+    labels = {"file": path.stem, "index": str(index), "key": key}
+    every: Sequence[Floats] = list(columns.values())
+    rows = max((len(column) for column in every), default=0)
+    return Table(labels, [(name,) for name in columns], every.__getitem__, rows, lambda row: f"row {row + 1}")

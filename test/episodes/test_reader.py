@@ -150,7 +150,7 @@ def test_poses_that_are_not_finite_are_left_out_and_counted(tmp_path: Path, bad:
     assert found.tracks[0].stamp_ns.tolist() == stamps[:3] + stamps[4:]
     (remark,) = found.remarks
     assert "1 of 5 messages of puck1" in remark
-    assert remark.endswith("(1 not finite): number 4")
+    assert remark.endswith("(1 without a number): number 4")
     nothing = complaint(pose_bag(tmp_path / "lost", stamps, [(0.0, bad)] * 5), PUCK1)
     assert "nothing is left of puck1" in nothing
 
