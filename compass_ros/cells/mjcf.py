@@ -10,15 +10,15 @@ import numpy as np
 from compass_ros.cells.bindings import Command, Start, offsets, shift
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.dynamics import Sliding
-from compass_ros.cells.fields import Fields, names, rows
+from compass_ros.cells.fields import Fields, rows
 from compass_ros.cells.keyframe import begun, first_state, place_mocap
-from compass_ros.cells.sensors import add_sensors, columns_of
+from compass_ros.cells.scene import compiled
+from compass_ros.cells.sensors import columns_of
 from compass_ros.cells.spec import ParameterSpec
 from compass_ros.cells.start import input_names
 from compass_ros.errors import ConfigError
 from compass_ros.types import Floats, Ints
 
-_NUDGE_M = 1e-9
 _TABLE = {"table_friction": None, "table_creep": 0.002, "table_load": 1.0}
 """Fields of a sliding body, with what is taken where the YAML has none."""
 
@@ -29,7 +29,7 @@ class Mjcf:
     def __init__(self, cell: Cell) -> None:
         self._cell = cell
         self._where = str(cell.path)
-        self._model, self._rests_as_drawn = _compiled(cell)
+        self._model, self._rests_as_drawn = compiled(cell)
         for p in cell.spec.parameters:
             if not p.field:
                 raise ConfigError(f"{self._where}: {p.name}: field: missing; say which field of the scene it is")
@@ -131,58 +131,3 @@ def _table_fields(model: mujoco.MjModel, parameters: Sequence[ParameterSpec], wh
         if "table_friction" not in fields:
             raise ConfigError(f"{where}: body '{body}' has a table_creep or table_load but no table_friction")
     return out
-
-
-def _compiled(cell: Cell) -> tuple[mujoco.MjModel, Ints]:
-    """The scene, with sensors for what is tracked, and the tendons whose spring rests at the length that is drawn.
-
-    Raises ConfigError with MuJoCo's own words in one line.
-    """
-    try:
-        spec = mujoco.MjSpec.from_file(str(cell.model_path))
-        nominal = spec.compile()
-    except ValueError as error:
-        raise ConfigError(f"{cell.model_path}: {' '.join(str(error).split())}") from error
-    add_sensors(spec, nominal, cell.signals, str(cell.path))
-    simple = _tuned_though_simple(nominal, cell.spec.parameters)
-    for name in simple:
-        _nudge(spec.body(name), nominal.body(name))
-    model = spec.compile()
-    if simple:
-        _same_numbers(model, nominal)
-    as_drawn = [tendon.id for tendon in spec.tendons if tendon.springlength[0] < 0]
-    return model, np.array(as_drawn, np.int64)
-
-
-def _tuned_though_simple(nominal: mujoco.MjModel, parameters: Sequence[ParameterSpec]) -> list[str]:
-    """Bodies whose inertial frame or joint's place is tuned, and whose inertia matrix MuJoCo has taken for diagonal."""
-    tuned: list[str] = []
-    for p in parameters:
-        of = [one.strip() for one in p.of.split(",")]
-        if p.field.startswith(("body_ipos", "body_iquat", "inertia_turn")):
-            tuned += of
-        elif p.field.startswith(("jnt_pos", "jnt_axis")):
-            found = [mujoco.mj_name2id(nominal, mujoco.mjtObj.mjOBJ_JOINT, one) for one in of]
-            tuned += [nominal.body(nominal.jnt_bodyid[joint]).name for joint in found if joint >= 0]
-    return [n for n in dict.fromkeys(tuned) if n in names(nominal, mujoco.mjtObj.mjOBJ_BODY) and _simple(nominal, n)]
-
-
-def _simple(model: mujoco.MjModel, body: str) -> bool:
-    return bool(model.body_simple[model.body(body).id])
-
-
-def _nudge(body: mujoco.MjsBody, own: object) -> None:
-    """Place a body's centre a little beside its frame, whatever its inertia was read from."""
-    body.explicitinertial = True
-    body.mass, body.inertia, body.iquat = float(own.mass[0]), own.inertia, own.iquat  # type: ignore[attr-defined]
-    body.ipos = own.ipos + _NUDGE_M  # type: ignore[attr-defined]
-    body.fullinertia = np.full(6, np.nan)  # unset: what it said is in the inertia and the orientation of its axes now
-    body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-
-
-def _same_numbers(model: mujoco.MjModel, nominal: mujoco.MjModel) -> None:
-    """Give a model the numbers of another one; what is not a number (structure, flags) and sensors stay its own."""
-    for name in dir(nominal):
-        numbers = getattr(nominal, name, None)
-        if isinstance(numbers, np.ndarray) and numbers.dtype.kind == "f" and not name.startswith("sensor"):
-            getattr(model, name)[:] = numbers
