@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
@@ -20,7 +20,7 @@ from compass_ros.calibration.problem import Allowance, Problem
 from compass_ros.calibration.refine import Refined, refine, with_launches
 from compass_ros.cells import Cell
 from compass_ros.config import CalibrationConfig
-from compass_ros.discovery import Discovery, discover, not_evaluated
+from compass_ros.discovery import Discovery, discover, fit_failed, not_evaluated
 from compass_ros.discovery.floor import honest
 from compass_ros.discovery.unseen import unexpected
 from compass_ros.errors import DataError
@@ -44,9 +44,16 @@ from compass_ros.types import (
 )
 from compass_ros.types import Replay as Drawn
 
+Keep = Callable[[Result, Discovery], object]
+"""Takes a calibration before the search for missing physics begins: whatever happens to that, it stands."""
+
 
 def calibrate(
-    episodes: Sequence[Episode], cell: Cell, config: CalibrationConfig, report: Report = silent
+    episodes: Sequence[Episode],
+    cell: Cell,
+    config: CalibrationConfig,
+    report: Report = silent,
+    keep: Keep | None = None,
 ) -> tuple[Result, Discovery]:
     """Which parameters, which values, what is left. Raises DataError where the recordings cannot answer.
 
@@ -70,12 +77,13 @@ def calibrate(
         if not config.discover:
             found = not_evaluated("it was switched off")
             break
-        refined = refined or refine(problem.likelihood, estimate.values)
+        if keep is not None:
+            begun = not_evaluated("the search has not ended")
+            keep(assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, begun), begun)
         may_turn = turn == 0 and 0 < 2 * len(held_out) <= len(used)
-        if not (may_turn and unexpected(unseen, refined)):
-            found = discover(simulator, refined, unseen, noise, config.seed, report)
-            if not (may_turn and found.untaught):
-                break
+        found = searched(simulator, problem, estimate, refined, unseen, noise, config.seed, may_turn, report)
+        if not (may_turn and found.untaught):
+            break
         told.append(
             f"what fits the other episodes to the noise does not predict {', '.join(judge.names)}: these are fitted, "
             "others are held out"
@@ -85,6 +93,32 @@ def calibrate(
         said = f"{len(used)} of {len(episodes)} episodes were used, evenly over the order of recording"
         told.append(f"{said}; the option `episodes` takes more")
     return replace(result, warnings=(*told, *result.warnings)), found
+
+
+def searched(
+    simulator: Simulator,
+    problem: Problem,
+    estimate: Estimate,
+    refined: Refined | None,
+    unseen: Likelihood,
+    noise: Noise,
+    seed: int,
+    may_turn: bool,
+    report: Report,
+) -> Discovery:
+    """What is missing, or why that cannot be said: the calibration stands either way.
+
+    `may_turn`: not looked for where what fits these episodes to the noise does not predict the others.
+    """
+    try:
+        refined = refined or refine(problem.likelihood, estimate.values)
+        if may_turn and unexpected(unseen, refined):
+            return replace(not_evaluated("other episodes are needed"), untaught=True)
+        return discover(simulator, refined, unseen, noise, seed, report)
+    except DataError as error:
+        return not_evaluated(str(error))
+    except np.linalg.LinAlgError as error:
+        return fit_failed(f"a step of the search has no solution ({error})")
 
 
 def evenly(episodes: Sequence[Episode], most: int) -> list[Episode]:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 from compass_ros.reporting.markdown import replace_between
 from compass_ros.simulation.effects import EFFECTS, Quantity
+from compass_ros.simulation.sites import JOINTS, in_words
+from compass_ros.simulation.sizes import unit_joint
 
 PAGE = Path(__file__).parents[1] / "docs" / "effects.md"
 BEGIN, END = "<!-- table: begin -->\n", "<!-- table: end -->\n"
@@ -25,11 +27,16 @@ def table() -> str:
     """Markdown, a section for each channel."""
     lines = []
     for channel in ("dynamics", "contact", "actuation", "sensing"):
-        lines += [f"### {channel}", "", "| name | formula | parameters: bounds [unit] |", "|---|---|---|"]
+        lines += [f"### {channel}", "", "| name | acts on | formula | parameters: bounds [unit] |", "|---|---|---|---|"]
         for name, effect in EFFECTS.items():
             if effect.channel == channel:
-                parameters = "<br>".join(_described(q) for q in effect.quantities)
-                lines.append(f"| `{name}` | {formula(name).replace('|', '&#124;')} | {parameters} |")
+                only_joints = set(effect.on) <= set(JOINTS)
+                parameters = [] if only_joints else [_described(q) for q in effect.quantities]
+                if effect.on_joint is not None:
+                    of_joint = [f"`{q.name}` [{q.unit}]" for q in effect.on_joint(unit_joint("hinge"))]
+                    parameters.append(f"on a hinge: {', '.join(of_joint)}")
+                row = (f"`{name}`", in_words(effect.on), formula(name).replace("|", "&#124;"), "<br>".join(parameters))
+                lines.append(f"| {' | '.join(row)} |")
         lines.append("")
     return "\n".join(lines)
 

@@ -13,12 +13,15 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from compass_ros.commands.progress import Bar
-from compass_ros.types import Progress
+from compass_ros.types import Progress, Result
+
+if TYPE_CHECKING:
+    from compass_ros.discovery import Discovery
 
 
 class ProgressStyle(str, Enum):
@@ -110,15 +113,19 @@ def run(
     cell = load(cell_name, validated.parameters)
     episodes = read_episodes(bags, sources(cell), cell.name, cell.hash)
     make_writable(out)  # now, and not after minutes of work
+    said = doubts(cell, episodes)
+
+    def write(result: Result, found: Discovery) -> Result:
+        budget = replace(result.budget, wall_seconds=time.monotonic() - started)
+        result = replace(result, budget=budget, warnings=(*said, *result.warnings))
+        write_all(result, found, cell, out, repeat)
+        return result
+
     with _shown(style) as report:
-        result, found = pipeline(episodes, cell, validated, report)
-    said = (*doubts(cell, episodes), *result.warnings)
-    budget = replace(result.budget, wall_seconds=time.monotonic() - started)
-    result = replace(result, budget=budget, warnings=said)
-    write_all(result, found, cell, out, repeat)
+        result = write(*pipeline(episodes, cell, validated, report, write))
     if style is ProgressStyle.bar:
         print_result(result)
-        for warning in said:
+        for warning in result.warnings:
             typer.echo(f"note: {warning}", err=True)
         print(f"report: {os.path.relpath(out / 'report.html')}")
 

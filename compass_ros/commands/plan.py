@@ -82,7 +82,7 @@ def look(
     count, fields = len(inputs), len(cell.action)
     pool = draw(simulator, tries * count, rng) if propose else inputs[:0]
     space = linearised(simulator, np.concatenate([inputs, pool]), rate, cell.spec.noise_m)
-    known = information(space, candidates(simulator))
+    known = information(space, candidates(simulator, *space.told))
     plan = plan_of(known.of_shots(np.arange(count)))
     if not propose:
         return Planned(actions, plan, warnings, None, None)

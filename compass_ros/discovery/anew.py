@@ -30,7 +30,7 @@ def contacts_anew(space: Space, scores: Sequence[Score]) -> Iterator[Joint]:
     `scores`: the best first.
     """
     of_contacts = [s for s in scores if s.candidate.attached.effect.channel == "contact"]
-    of_walls = [s for s in of_contacts if s.candidate.attached.effect.on == "walls"]
+    of_walls = [s for s in of_contacts if s.candidate.attached.effect.on_walls]
     tried = [s for s in of_contacts if s not in of_walls[WALLS:]]
     starts = [((s.candidate.attached,), beginning(s, size)) for s in tried for size in SIZES]
     return best_of(space, starts, KEPT)

@@ -69,8 +69,9 @@ def from_the_beginning(
     kinds = sketched(space, forces)[:TRIED], [_freed(joint, beginning) for joint in sorted(started, key=_left)[:FEW]]
     tried = [sorted((further(j, SLIGHT, 4) for j in promising), key=_left) for promising in kinds]
     for joint in sorted((j for kind in tried for j in different(kind)[:FEW]), key=worth):
-        all_objects = next(c.attached for c in asked if c.name == joint.name)
-        sets = dict.fromkeys((joint.added[0], all_objects if all_objects.effect.on == "objects" else joint.added[0]))
+        own = joint.added[0]
+        widest = next(c.attached for c in asked if c.name == joint.name and c.attached.effect.on == own.effect.on)
+        sets = dict.fromkeys((own, widest if own.effect.moves else own))
         yield [grown(joint, attached, simulator, likelihood, fit.robust) for attached in sets]
 
 

@@ -1,11 +1,18 @@
-"""Which effects are asked about in a cell, and on what they could act."""
+"""Which effects are asked about in a cell, and on what: those that can act on what it has, by kinds of sites."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 
 from compass_ros.simulation import Simulator
-from compass_ros.simulation.effects import EFFECTS, Attached
+from compass_ros.simulation.effects import EFFECTS, Attached, Effect
+from compass_ros.simulation.sites import DRIVES, JOINTS, PLANAR, Site, SiteKind, names_of
+from compass_ros.simulation.sizes import JointSize, alike
+from compass_ros.types import Floats
+
+ALIKE: tuple[tuple[SiteKind, ...], ...] = (PLANAR, *((kind,) for kind in JOINTS))
+"""What moves in the same way: one number of an effect means the same for all of them."""
 
 
 @dataclass(frozen=True)
@@ -23,26 +30,67 @@ class Candidate:
     @property
     def by_force(self) -> bool:
         """Whether it pushes bodies along their way, so that impulse responses tell what it does."""
-        return self.attached.effect.forces is not None and self.attached.effect.on == "objects"
+        return self.attached.effect.forces is not None and self.attached.effect.moves
 
 
-def candidates(simulator: Simulator) -> tuple[Candidate, ...]:
-    """All laws that can act in this cell: on all its movers together, on each alone, on each wall."""
-    movers = simulator.movers()
-    out: list[Candidate] = []
+def candidates(simulator: Simulator, values: Floats, inputs: Floats, time_s: Floats) -> tuple[Candidate, ...]:
+    """All laws that can act in this cell, with the sizes that they can have there.
+
+    On all movers of a kind together and on each alone, on each wall, on the drives of a kind and on each alone. (P,)
+    values, (E, A) inputs and (E, F) times [s] say how joints move and what drives are told.
+    """
+    joints = simulator.joint_sizes(values, inputs, time_s)
+    out: list[Attached] = []
     for effect in EFFECTS.values():
-        if effect.scattered or (effect.channel == "actuation" and not simulator.actuated):
-            continue
-        if effect.on == "cell":
-            sets: list[tuple[str, ...]] = [()]
-        elif effect.on == "walls":
-            sets = [(wall,) for wall in simulator.walls()]
-        else:
-            sets = [movers] if len(movers) < 2 else [movers, *((m,) for m in movers)]
-        out.extend(Candidate(Attached(effect, objects)) for objects in sets if simulator.accepts(effect, objects))
-    return tuple(out)
+        if effect.moves:
+            out.extend(_on_movers(effect, simulator, joints))
+        elif effect.on_walls:
+            out.extend(Attached(effect, (wall,)) for wall in simulator.places.walls)
+        elif any(kind in DRIVES for kind in effect.on):
+            out.extend(_on_drives(effect, simulator, (values, inputs, time_s)))
+        elif simulator.accepts(effect, ()):
+            out.append(Attached(effect, ()))
+    return tuple(Candidate(attached) for attached in out if not attached.effect.scattered)
 
 
-def scattered(simulator: Simulator) -> tuple[Candidate, ...]:
-    """Effects that differ from episode to episode by chance."""
-    return tuple(Candidate(Attached(e, ())) for e in EFFECTS.values() if e.scattered and simulator.actuated)
+def scattered(simulator: Simulator, values: Floats, inputs: Floats, time_s: Floats) -> tuple[Candidate, ...]:
+    """Effects that differ from episode to episode by chance: on all drives of a kind."""
+    of_chance = [effect for effect in EFFECTS.values() if effect.scattered]
+    told = (values, inputs, time_s)
+    return tuple(Candidate(a) for effect in of_chance for a in _on_drives(effect, simulator, told))
+
+
+def _on_movers(effect: Effect, simulator: Simulator, joints: Mapping[str, JointSize]) -> Iterator[Attached]:
+    """All movers of a kind together, and each alone."""
+    places = simulator.places
+    able = [site for site in simulator.moving.values() if effect.takes(places.model, site)]
+    for kinds in ALIKE:
+        for sites in together_and_alone([site for site in able if site.kind in kinds]):
+            names = names_of(sites)
+            if sites[0].kind in JOINTS:
+                yield Attached(effect.at(alike([joints[name] for name in names])), names)
+                continue
+            own = tuple(dict.fromkeys(site.kind for site in sites))
+            mistaken = any(places.of(site.name, effect.on) != site for site in sites)  # for a joint of the same name
+            yield Attached(replace(effect, on=own) if mistaken else effect, names)
+
+
+def _on_drives(effect: Effect, simulator: Simulator, told: tuple[Floats, Floats, Floats]) -> Iterator[Attached]:
+    """All drives of a kind together, and each alone; without names all of the cell where they are of one kind."""
+    able = [drive for drive in simulator.places.drives if drive.kind in effect.on]
+    for kind in dict.fromkeys(drive.kind for drive in able):
+        for drives in together_and_alone([drive for drive in able if drive.kind == kind]):
+            objects = () if drives == able else names_of(drives)
+            if effect.on_drive is None or kind == "tool_drive":
+                sized: Effect = effect
+            elif (size := simulator.drive_size(drives, *told)).command > 0:
+                sized = effect.at(size)
+            else:
+                continue  # what was never told anything cannot show it
+            if all(objects) or not objects:
+                yield Attached(sized, objects)
+
+
+def together_and_alone(sites: list[Site]) -> list[list[Site]]:
+    """All of some sites, and each one where they are several."""
+    return [sites, *([site] for site in sites)] if len(sites) > 1 else [[site] for site in sites]

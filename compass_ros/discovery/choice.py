@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from compass_ros.calibration.least_squares import Fit, cost
@@ -83,13 +83,14 @@ class Choice:
 
     def verdict(self, unseen: HeldOut) -> Joint | None:
         """The model that is to be named: of one effect or of two; None where none may be."""
-        if self.two and self.pair is not None:
-            return self.pair
-        best = self.singles[0] if self.singles else None
-        if best is not None and self.nameable(best, unseen):
-            return best
-        needed = self.pair is not None and best is not None and self.explains(self.pair, best)
-        return self.pair if self.pair is not None and needed and self.nameable(self.pair, unseen) else None
+        return next(iter(self.verdicts(unseen)), None)
+
+    def verdicts(self, unseen: HeldOut) -> Iterator[Joint]:
+        """Models that may be named, the best first: two effects where they are two, one that is enough, a pair."""
+        best, pair = self.singles[0] if self.singles else None, self.pair
+        needed = best is not None and pair is not None and self.explains(pair, best)
+        ranked = (pair if self.two else None, best, pair if needed and not self.two else None)
+        return (joint for joint in ranked if joint is not None and self.nameable(joint, unseen))
 
     def good(self, unseen: HeldOut) -> list[Joint]:
         """Models of one effect that may be named, the best first."""
@@ -97,10 +98,10 @@ class Choice:
         return sorted(good, key=lambda j: -evidence(j, unseen))
 
     def nameable(self, joint: Joint, unseen: HeldOut) -> bool:
-        """Whether a model explains the fitted episodes and predicts the others."""
+        """Whether a model explains the fitted episodes and predicts the others, with laws that are what they say."""
         share = unseen.share(joint)
         predicts = share >= PREDICTS or (share >= FORM_SHARE and unseen.remainder(joint) < SMALL)
-        return self.enough(joint) and unseen.helps(joint) and predicts and not joint.stands_in
+        return self.enough(joint) and unseen.helps(joint) and predicts and not joint.stands_in and joint.distinct()
 
     def complete(self) -> bool:
         """Whether a model leaves nothing of the fitted episodes: what it does not predict, only others can show."""

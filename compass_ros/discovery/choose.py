@@ -106,7 +106,7 @@ def _with_scatter(choice: Choice, space: Space, candidates: Sequence[Candidate],
     Asked last, for a number for each episode would stand for two laws as well.
     """
     slight = SLIGHT * choice.excess
-    for candidate in scattered(space.simulator):
+    for candidate in scattered(space.simulator, *space.told):
         joint = fit_scattered(space, candidate, slight)
         if choice.of([joint]).share(joint) < LEADS or follows_command(joint):
             continue
@@ -245,6 +245,7 @@ def _equals(best: Joint, choice: Choice, unseen: HeldOut) -> tuple[Joint, ...]:
         and top - evidence(joint, unseen) < margin
         and unseen.helps(joint)
         and not joint.stands_in
+        and joint.distinct()
     ]
     names = {best.name, *(joint.name for joint in equal)}
     return tuple(joint for joint in equal if joint.added[0].effect.limit not in names)

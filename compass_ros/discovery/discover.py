@@ -54,7 +54,9 @@ def discover(
         return report(Progress(stage, 0, 0.7 + 0.3 * done, float("nan"), float("nan")))
 
     tell("screen effects", 0.0)
-    asked, plain = candidates(simulator), followed(refined.likelihood, refined.fit)
+    plain = followed(refined.likelihood, refined.fit)
+    told = (refined.fit.point.values, likelihood.inputs, likelihood.time_s)
+    asked = candidates(simulator, *told)
     space, scores = screen(simulator, *plain, asked)
     null = simulate_null(space, scores, noise, seed)
     plan = plan_of(information(space, asked))

@@ -71,6 +71,11 @@ def not_evaluated(reason: str) -> Discovery:
     return Discovery(Mismatch("not_evaluated", None, (), (), "", f"Missing physics was not looked for: {reason}."))
 
 
+def fit_failed(reason: str) -> Discovery:
+    """No verdict, for a fit of the search went wrong."""
+    return Discovery(Mismatch("fit_failed", None, (), (), "", f"No verdict on missing physics: {reason}."))
+
+
 @dataclass(frozen=True)
 class Finding:
     """What is known when the verdict is due."""
@@ -108,15 +113,15 @@ class Finding:
 
     def judged(self, choice: Choice, unseen: HeldOut) -> Discovery:
         """Named, ambiguous, unknown or failed."""
-        joint = choice.verdict(unseen)
-        if joint is not None:
-            return self.named(joint, choice, (choice.equal,) if len(joint.added) == 1 else ((), ()))
+        for found in choice.verdicts(unseen):
+            joint = from_second_start(found)
+            std = self._std(joint)
+            if joint.distinct(std):
+                return self.named(joint, std, choice, (choice.equal,) if len(joint.added) == 1 else ((), ()))
         return replace(self.unknown(choice, unseen), untaught=choice.complete() or choice.untaught(unseen))
 
-    def named(self, joint: Joint, choice: Choice, equal: tuple[tuple[Joint, ...], ...]) -> Discovery:
+    def named(self, joint: Joint, std: Floats, choice: Choice, equal: tuple[tuple[Joint, ...], ...]) -> Discovery:
         """One or two effects with values, errors and evidence."""
-        joint = from_second_start(joint)
-        std = self._std(joint)
         movers = self.simulator.movers()
         findings, at = [], len(self.simulator.cell.parameters)
         for attached, equals in zip(joint.added, equal, strict=True):
@@ -140,7 +145,7 @@ class Finding:
             following = next_experiment(self.simulator, self.space.likelihood, rivals, self.seed).sentence
             lacks = "one of these: " + "; ".join(a.effect.sentence for j in rivals for a in j.added)
         values = "; ".join(value_of(f, a) for f, a in zip(findings, joint.added, strict=True))
-        sentence = f"{place(where)}, the simulator lacks {lacks}; {values}; {self._errors(joint)}."
+        sentence = f"{place(where, self._flat)}, the simulator lacks {lacks}; {values}; {self._errors(joint)}."
         verdict: Verdict = "ambiguous" if ambiguous else "named"
         mismatch = Mismatch(verdict, where, tuple(findings), self.undetectable, following, sentence)
         return self._with(joint, mismatch, choice, std)
@@ -151,7 +156,7 @@ class Finding:
         if not sure and not choice.singles:
             return self.failed("No verdict: the fit did not reach the noise floor and no place stands out.")
         proposal: Proposal | None = propose(self.space, self.judge)
-        sentence = f"{place(where)}, something differs that no known effect explains"
+        sentence = f"{place(where, self._flat)}, something differs that no known effect explains"
         if choice.singles:
             best = choice.singles[0]
             explained, predicted = 100 * choice.share(best), 100 * np.clip(unseen.share(best), 0, 1)
@@ -188,6 +193,11 @@ class Finding:
 
     def _floor(self, noise: Noise) -> float:
         return rms_distance(self.simulator.cell, noise.rms[None, None])
+
+    @property
+    def _flat(self) -> bool:
+        """Whether something that is tracked slides on a table."""
+        return not self.space.pushes.joints.all()
 
     @cached_property
     def _before(self) -> float:

@@ -17,16 +17,19 @@ from itertools import combinations
 from math import comb, log
 
 import numpy as np
+from scipy.optimize import lsq_linear, minimize_scalar
 
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import with_launches
 from compass_ros.calibration.residuals import residual_at
-from compass_ros.discovery.candidates import Candidate
+from compass_ros.discovery.candidates import ALIKE, Candidate, candidates, together_and_alone
 from compass_ros.discovery.joint import Joint, fit_jointly
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.simulation.effects import Attached, Effect, Quantity
 from compass_ros.simulation.effects.effect import Context
 from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.simulation.sites import JOINTS, PLANAR, names_of
+from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize, alike
 from compass_ros.types import Floats, Ints
 
 NAME = "formula"
@@ -35,11 +38,36 @@ EXHAUSTIVE = 3
 MOST_TERMS = 6
 KEPT = 0.1
 """Share of the excess held-out error that a formula has to remove to be kept."""
-_LARGEST = 3.0
-"""Acceleration that one term may reach anywhere on the table at 0.5 m/s [m/s^2]."""
-_SIZE = {"x": 0.45, "y": 0.225, "vx": 0.5, "vy": 0.5, "speed": 0.5}
-_VARIABLES = tuple(_SIZE)
+IS = 0.05
+"""Root mean square difference along the recorded ways, as a share, up to which a formula is a law of the library."""
 _ALONG_X, _ALONG_Y, _AGAINST = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Variables:
+    """What a formula is written in, and how large it is. Joints: the position q and the speed; SI."""
+
+    names: tuple[str, str, str, str, str]
+    """Of x, y, vx, vy and speed."""
+    heads: tuple[str, str, str]
+    """Of the components: along x, along y, against the velocity."""
+    sizes: tuple[float, float, float, float, float]
+    largest: float
+    """Acceleration (joints: force) that one term may reach at these sizes."""
+    force_unit: str = "m s^-2"
+    length_unit: str = "m"
+
+
+TABLE = Variables(("x", "y", "vx", "vy", "speed"), ("ax", "ay", "slowing"), (0.45, 0.225, 0.5, 0.5, 0.5), 3.0)
+"""The edges of an air-hockey table, and the speed of its pucks."""
+
+
+def of_joint(size: JointSize) -> Variables:
+    """The ends of its way, its speed, and the forces that it saw."""
+    far, head = abs(size.middle) + 2 * size.spread, "torque" if size.kind == "hinge" else "force"
+    sizes = (far, 1.0, size.speed, 1.0, size.speed)
+    names, heads = ("q", "", "", "", "speed"), (head, "", f"slowing {head}")
+    return Variables(names, heads, sizes, LARGEST * size.force, size.force_unit, size.length_unit)
 
 
 @dataclass(frozen=True)
@@ -49,30 +77,34 @@ class Monomial:
     component: int
     """0 along x, 1 along y, 2 against the velocity."""
     powers: tuple[int, int, int, int, int]
+    of: Variables = TABLE
 
     @property
     def size(self) -> float:
-        """Its value at the edge of the table and 0.5 m/s."""
-        return float(np.prod([_SIZE[v] ** p for v, p in zip(_VARIABLES, self.powers, strict=True)]))
+        """Its value at the sizes of its variables."""
+        return float(np.prod([v**p for v, p in zip(self.of.sizes, self.powers, strict=True)]))
 
     @property
     def unit(self) -> str:
         """Of its coefficient."""
-        metres, seconds = 1 - sum(self.powers), sum(self.powers[2:]) - 2
-        parts = [f"{base}^{power}" if power != 1 else base
-                 for base, power in (("m", metres), ("s", seconds)) if power]  # fmt: skip
-        return " ".join(parts) or "1"
+        lengths, seconds = sum(self.powers), sum(self.powers[2:])
+        parts = [part.partition("^") for part in self.of.force_unit.split()]
+        counted = {base: int(power or 1) for base, _, power in parts}
+        counted[self.of.length_unit] = counted.get(self.of.length_unit, 0) - lengths
+        counted["s"] = counted.get("s", 0) + seconds
+        return " ".join(f"{base}^{power}" if power != 1 else base for base, power in counted.items() if power) or "1"
 
     @property
     def text(self) -> str:
-        parts = [f"{v}^{p}" if p > 1 else v for v, p in zip(_VARIABLES, self.powers, strict=True) if p]
-        return " ".join(parts)
+        named = zip(self.of.names, self.powers, strict=True)
+        return " ".join(f"{v}^{p}" if p > 1 else v for v, p in named if p)
 
     @property
     def name(self) -> str:
         """As a name of a quantity."""
-        head = ("ax", "ay", "slowing")[self.component]
-        return "_".join([head, *(f"{v}{p}" if p > 1 else v for v, p in zip(_VARIABLES, self.powers, strict=True) if p)])
+        head = self.of.heads[self.component].replace(" ", "_")
+        named = zip(self.of.names, self.powers, strict=True)
+        return "_".join([head, *(f"{v}{p}" if p > 1 else v for v, p in named if p)])
 
 
 @dataclass(frozen=True)
@@ -90,7 +122,7 @@ class Formula:
     def text(self) -> str:
         """As in 'ax = +0.21 x, slowing = +0.4 speed^2' (SI)."""
         parts = []
-        for component, head in enumerate(("ax", "ay", "slowing")):
+        for component, head in enumerate(self.terms[0].of.heads):
             own = [
                 f"{c:+.3g} {t.text}".strip()
                 for t, c in zip(self.terms, self.coefficients, strict=True) if t.component == component
@@ -112,15 +144,20 @@ class Proposal:
 
 
 @cache
-def basis() -> tuple[Monomial, ...]:
-    """Fields up to the third degree in place, couplings to velocity, and slowing that depends on speed and place."""
-    out = []
-    for component in (_ALONG_X, _ALONG_Y):
-        out += [Monomial(component, (i, j, 0, 0, 0)) for i in range(4) for j in range(4 - i)]
-        out += [Monomial(component, (0, 0, *v, s)) for v in ((1, 0), (0, 1)) for s in (0, 1)]
-    places = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
-    out += [Monomial(_AGAINST, (*place, 0, 0, s)) for place in places for s in (0, 1)]
-    out += [Monomial(_AGAINST, (0, 0, 0, 0, s)) for s in (2, 3)]
+def basis(of: Variables = TABLE) -> tuple[Monomial, ...]:
+    """Fields up to the third degree in place, couplings to velocity, and slowing that depends on speed and place.
+
+    On a joint there is one direction: a force that couples to its velocity is slowing.
+    """
+    out: list[Monomial] = []
+    flat = bool(of.names[1])
+    for component in (_ALONG_X, _ALONG_Y) if flat else ():
+        out += [Monomial(component, (i, j, 0, 0, 0), of) for i in range(4) for j in range(4 - i)]
+        out += [Monomial(component, (0, 0, *v, s), of) for v in ((1, 0), (0, 1)) for s in (0, 1)]
+    out += [Monomial(_ALONG_X, (i, 0, 0, 0, 0), of) for i in range(4)] if not flat else []
+    places = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)] if flat else [(0, 0), (1, 0), (2, 0)]
+    out += [Monomial(_AGAINST, (*place, 0, 0, s), of) for place in places for s in (0, 1)]
+    out += [Monomial(_AGAINST, (0, 0, 0, 0, s), of) for s in (2, 3)]
     return tuple(out)
 
 
@@ -129,24 +166,29 @@ def effect_of(terms: Sequence[Monomial]) -> Effect:
 
     def forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
         out = []
-        for name in context.objects:
+        for site in context.sites:
             for i, term in enumerate(terms):
                 rest = np.tile([*term.powers, term.component], (len(numbers), 1))
-                out.append(Term(Kind.LIBRARY, name, np.hstack([numbers[:, i : i + 1], rest])))
+                out.append(Term(Kind.LIBRARY, site, np.hstack([numbers[:, i : i + 1], rest])))
         return tuple(out)
+
+    def quantity(t: Monomial) -> Quantity:
+        most = t.of.largest / t.size
+        return Quantity(t.name, t.unit, -most, most, 0.02 / t.size if t.of is TABLE else MODEST / LARGEST * most)
 
     return Effect(
         name=NAME,
         channel="dynamics",
-        quantities=tuple(Quantity(t.name, t.unit, -_LARGEST / t.size, _LARGEST / t.size, 0.02 / t.size) for t in terms),
+        quantities=tuple(quantity(t) for t in terms),
         sentence="a force as proposed by regression",
+        on=(*PLANAR, *JOINTS),
         forces=forces,
     )
 
 
-def regress(space: Space, objects: tuple[str, ...]) -> tuple[Formula, ...]:
+def regress(space: Space, objects: tuple[str, ...], of: Variables = TABLE) -> tuple[Formula, ...]:
     """The best formula on some movers with 1, 2, ... terms, up to what the residual asks for; none of noise."""
-    terms = basis()
+    terms = basis(of)
     candidate = Candidate(Attached(effect_of(terms), objects))
     units = np.diag([q.scale for q in candidate.attached.effect.quantities])
     weights = space.weights(candidate, np.zeros(len(terms)), units)
@@ -200,9 +242,7 @@ def propose(space: Space, held_out: Likelihood, iterations: int = 12) -> Proposa
 
     `held_out`: other episodes of the space's simulator, with the same prior. Terms are added while they gain there.
     """
-    movers = space.pushes.movers
-    sets = [movers] if len(movers) < 2 else [movers, *((m,) for m in movers)]
-    by_objects = [formulas for formulas in (regress(space, objects) for objects in sets) if formulas]
+    by_objects = [formulas for formulas in (regress(space, *one) for one in _movers(space)) if formulas]
     before = _excess(held_out, space.fit.point.values)
     if not by_objects or before <= 0:
         return None
@@ -212,16 +252,72 @@ def propose(space: Space, held_out: Likelihood, iterations: int = 12) -> Proposa
         gain = 1 - _excess(joint.likelihood.on(held_out), joint.fit.point.values) / before
         if gain < best + KEPT:
             break
-        best, proposal = gain, _proposal(formula, joint, gain)
+        best, proposal = gain, _proposal(space, formula, joint, gain)
     return proposal
 
 
-def _proposal(formula: Formula, joint: Joint, gain: float) -> Proposal:
+def _movers(space: Space) -> list[tuple[tuple[str, ...], Variables]]:
+    """The movers of a kind together, and each alone, with what a formula on them is written in."""
+    sizes = space.simulator.joint_sizes(*space.told)
+    moving = space.simulator.moving.values()
+    of_kinds = [[site for site in moving if site.kind in kinds] for kinds in ALIKE]
+    sets = [names_of(chosen) for own in of_kinds for chosen in together_and_alone(own)]
+    return [(names, of_joint(alike([sizes[n] for n in names])) if names[0] in sizes else TABLE) for names in sets]
+
+
+def _proposal(space: Space, formula: Formula, joint: Joint, gain: float) -> Proposal:
     fitted = replace(formula, coefficients=joint.fit.point.values[-len(formula.terms) :])
     objects = " and ".join(formula.score.candidate.attached.objects)
     removed = f"removes {100 * gain:.0f} % of the held-out excess"
-    sentence = f"a formula is proposed for {objects}, not named: {fitted.text} (SI), which {removed}."
+    known = spelled(space, fitted)
+    that = f"; that is {' and '.join(known)} of the library" if known else ""
+    sentence = f"a formula is proposed for {objects}, not named: {fitted.text} (SI), which {removed}{that}."
     return Proposal(fitted, joint, gain, sentence)
+
+
+def spelled(space: Space, formula: Formula) -> list[str]:
+    """Laws of the library that a formula is, along the recorded ways: one for the whole of it, or one for a term each.
+
+    Compared are the accelerations, so that it does not matter how either of them is written.
+    """
+    objects = formula.score.candidate.attached.objects
+    laws = [c for c in candidates(space.simulator, *space.told) if c.by_force and c.attached.objects == objects]
+    units = np.eye(len(formula.terms)) * [q.scale for q in formula.score.candidate.attached.effect.quantities]
+    columns = space.weights(formula.score.candidate, np.zeros(len(formula.terms)), units)
+    parts = columns.reshape(-1, len(formula.terms)) * formula.coefficients
+    whole = _law_of(space, laws, parts.sum(axis=1))
+    return [whole] if whole else [law for part in parts.T if (law := _law_of(space, laws, part))]
+
+
+def _law_of(space: Space, laws: Sequence[Candidate], wanted: Floats) -> str:
+    """The law of at most one shape that comes nearest to (H,) accelerations, if it is the same; else empty."""
+    found = [(_apart(space, law, wanted), law.name) for law in laws]
+    left, best = min(found, default=(np.inf, ""))
+    return best if left < IS else ""
+
+
+def _apart(space: Space, law: Candidate, wanted: Floats) -> float:
+    """Share of (H,) accelerations that a law within its bounds leaves, at its best amplitudes and shape."""
+    quantities = law.attached.effect.quantities
+    amplitudes = [i for i, q in enumerate(quantities) if q.amplitude]
+    shapes = [i for i, q in enumerate(quantities) if not q.amplitude]
+    low, high, scale = (np.array([getattr(quantities[i], of) for i in amplitudes]) for of in ("low", "high", "scale"))
+    size = float(np.linalg.norm(wanted))
+    if size == 0 or len(shapes) > 1 or not law.attached.effect.superposes:
+        return np.inf
+
+    def left(shape: float) -> float:
+        numbers = np.zeros(len(quantities))
+        numbers[shapes] = shape
+        units = np.diag([q.scale for q in quantities])[amplitudes]
+        columns = space.weights(law, numbers, units).reshape(-1, len(amplitudes)) * scale / size
+        solved = lsq_linear(columns, wanted / size, (low / scale, high / scale))
+        return float(np.linalg.norm(wanted / size - columns @ solved.x))
+
+    if not shapes:
+        return left(0.0)
+    bounds = (quantities[shapes[0]].low, quantities[shapes[0]].high)
+    return left(float(minimize_scalar(left, bounds=bounds, method="bounded").x))
 
 
 def _excess(likelihood: Likelihood, values: Floats) -> float:

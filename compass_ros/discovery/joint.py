@@ -27,6 +27,8 @@ from compass_ros.types import Floats, Ints
 
 _SHARES = (0.0, 0.15, 0.4, 0.7, 1.0)
 """Parts of the first-order step that are tried as a start."""
+ERROR_BARS = 2.0
+"""Error bars from zero within which a law is not named: a 95 % interval that holds its absence."""
 HALF = 4
 """Horizons after which fits from several starts are compared: half of the episode."""
 
@@ -60,6 +62,32 @@ class Joint:
         least, most = widths(quantities), np.array([q.most for q in quantities])
         return bool(np.any(((least > 0) & (numbers <= least)) | (numbers >= most)))
 
+    def distinct(self, std: Floats | None = None) -> bool:
+        """Whether each of its laws lies more than ERROR_BARS of its error bars from zero, all its amplitudes together.
+
+        (P + Q,) `std`: what else is known of the errors; at least what the noise leaves open counts. A scatter is
+        judged by its episodes.
+        """
+        at, free = len(self.simulator.cell.parameters), self.fit.free
+        hessian, _ = normal_equations(self.likelihood, self.fit.point, self.fit.linear, free, self.fit.robust)
+        prior = np.eye(len(hessian))
+        errors = np.linalg.inv((hessian - prior) / self.likelihood.correlation_time + prior)[: len(free), : len(free)]
+        units = self.likelihood.prior_std
+        for attached in self.simulator.effects:
+            own = at + np.flatnonzero(attached.amplitudes)
+            at += len(attached.effect.quantities)
+            found = np.flatnonzero(np.isin(free, own))
+            if attached.effect.scattered or not len(found):
+                continue
+            away = (self.fit.point.values / units)[free[found]]
+            inner = errors[np.ix_(found, found)]
+            if std is not None:  # the same correlations, with wider bars
+                wider = np.maximum((std / units)[free[found]] / np.sqrt(np.diag(inner)), 1.0)
+                inner = inner * np.outer(wider, wider)
+            if away @ np.linalg.solve(inner, away) < ERROR_BARS**2:
+                return False
+        return True
+
     def log_evidence(self, correlation_time: float) -> float:
         """Laplace approximation in the prior's units, the data's part divided by the correlation time."""
         hessian, _ = normal_equations(self.likelihood, self.fit.point, self.fit.linear, self.fit.free, self.fit.robust)
@@ -68,7 +96,7 @@ class Joint:
 
 def widths(quantities: Sequence[Quantity]) -> Floats:
     """(q,) least width of a field where a quantity is one [m]; zero for others."""
-    return np.array([q.low if q.unit == "m" and not q.amplitude else 0.0 for q in quantities]).clip(min=0)
+    return np.array([q.low if q.width else 0.0 for q in quantities])
 
 
 def widened(simulator: Simulator, likelihood: Likelihood, added: Sequence[Attached]) -> tuple[Simulator, Likelihood]:

@@ -33,7 +33,7 @@ class TableMap:
 
 
 def accelerations(space: Space, residual: Floats | None = None) -> Floats:
-    """(E, K, N, 2) accelerations [m/s^2] that would explain the residual best, smooth in time and small.
+    """(E, K, N, 2) accelerations of bodies in the plane that would explain the residual best, smooth and small [m/s^2].
 
     `residual`: (E, F, C) in sigma, where it is not that of the fit. The parameters stay where they are. A Gaussian
     process in time as prior; its size is the one of SCALES with the highest evidence.
@@ -64,11 +64,12 @@ def _log_evidence(gram: Floats, pull: Floats) -> float:
 def residual_map(space: Space, residual: Floats | None = None) -> TableMap | None:
     """Root mean square of the lacking acceleration over the table; None where nothing slides in the plane."""
     pushes = space.pushes
-    if not pushes.movers or float(np.ptp(pushes.paths[..., 1])) == 0:
+    slides = ~pushes.joints
+    if not slides.any():
         return None
-    push = accelerations(space, residual)
+    push = accelerations(space, residual)[:, :, slides]
     squared = np.sum(push**2, axis=3).ravel()
-    place = pushes.paths[..., :2].reshape(-1, 2)
+    place = pushes.paths[:, :, slides, :2].reshape(-1, 2)
     cell = np.floor(place / CELL_M).astype(int)
     first, (columns, rows) = cell.min(axis=0), np.ptp(cell, axis=0) + 1
     at = (cell[:, 1] - first[1]) * columns + cell[:, 0] - first[0]

@@ -17,9 +17,10 @@ import numpy as np
 from compass_ros.calibration.least_squares import normal_equations
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.joint import Joint
-from compass_ros.discovery.planned import draw
+from compass_ros.discovery.planned import drawn
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS
+from compass_ros.simulation.sites import JOINTS
 from compass_ros.types import Floats
 
 POOL = 32
@@ -47,7 +48,19 @@ OTHER: Mapping[frozenset[str], str] = MappingProxyType(
         frozenset({"contact"}): _SLOW,
     }
 )
-"""What to do that is no shot, by the channels of two effects that no shot tells apart."""
+"""What to do that is no shot, by the channels of two effects that no shot tells apart, on a table."""
+_ONE_CLOCK = "record the commands and the encoders with stamps of one clock, and a fast step of the command"
+_OTHER_SPEED = "repeat the motions at a third of their speed and at three times that, and from other places"
+_ONE_AT_A_TIME = "move one joint at a time, the others held"
+OF_JOINTS: Mapping[frozenset[str], str] = MappingProxyType(
+    {
+        **dict.fromkeys(OTHER, _ONE_CLOCK),
+        frozenset({"dynamics"}): _OTHER_SPEED,
+        frozenset({"dynamics", "contact"}): "repeat the motions where nothing is touched",
+        frozenset({"contact"}): "film one touch at several speeds with a fast camera",
+    }
+)
+"""The same where only joints are tracked."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +87,9 @@ def next_experiment(
     if not simulator.cell.action or simulator.cell.spec.start:
         return NextExperiment(_sentence_other(rivals, pairs), None, 0.0)
     rng = np.random.default_rng(seed)
-    shots = draw(simulator, pool, rng)
+    shots = drawn(simulator, pool, rng)
+    if not len(shots):
+        return NextExperiment(_sentence_other(rivals, pairs), None, 0.0)
     sigma = np.nanmedian(likelihood.sigma[:, : max(likelihood.sigma.shape[1] // 4, 1)], axis=(0, 1))
     predicted = [_predictions(rival, shots, sigma, simulator.cell.duration, rng) for rival in rivals]
     apart = np.array([_apart(predicted[a], predicted[b]) for a, b in pairs])  # (pairs, S)
@@ -144,6 +159,7 @@ def _sentence_other(rivals: Sequence[Joint], pairs: Sequence[tuple[int, int]]) -
 def other_than_a_shot(one: Joint, other: Joint) -> str:
     """What tells two models apart that no shot does."""
     names = {a.effect.name for a in one.added} ^ {a.effect.name for a in other.added}
+    joints = all(site.kind in JOINTS for site in one.simulator.moving.values())
     if not names:
-        return _ALONE
-    return OTHER[frozenset(sorted({str(EFFECTS[name].channel) for name in names})[-2:])]
+        return _ONE_AT_A_TIME if joints else _ALONE
+    return (OF_JOINTS if joints else OTHER)[frozenset(sorted({str(EFFECTS[name].channel) for name in names})[-2:])]

@@ -79,7 +79,7 @@ def with_contacts(first: Joint, candidates: Sequence[Candidate], slight: float) 
 
     First order says little of those: dampings take a small one away, and have to give it back as it grows.
     """
-    of_contacts = [c for c in candidates if c.attached.effect.channel == "contact" and c.attached.effect.on != "walls"]
+    of_contacts = [c for c in candidates if c.attached.effect.channel == "contact" and not c.attached.effect.on_walls]
     return _begun_beside([first], different(of_contacts), OF_CONTACTS, slight)
 
 

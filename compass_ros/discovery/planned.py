@@ -61,7 +61,9 @@ def _no_impulses(fit: Fit) -> Impulses:
     """Where nothing slides or turns, nothing is pushed."""
     episodes = len(fit.linear.residual)
     size = fit.linear.residual[0].size
-    return Impulses((), np.empty(0), np.empty((episodes, 0, 0, 4)), np.empty(0), np.empty((episodes, size, 0)))
+    none = np.empty(0)
+    paths, response = np.empty((episodes, 0, 0, 4)), np.empty((episodes, size, 0))
+    return Impulses((), np.empty(0, bool), none, paths, none, none, none, response)
 
 
 def completed(cell: Cell, actions: Floats) -> Floats:
@@ -77,18 +79,27 @@ def draw(simulator: Simulator, count: int, rng: np.random.Generator, box: Floats
 
     Raises DataError where there are hardly any.
     """
+    found = drawn(simulator, count, rng, box)
+    if len(found) < count:
+        where = simulator.cell.name
+        raise DataError(f"{where}: only {len(found)} shots were found that move something and are not chaotic")
+    return found
+
+
+def drawn(simulator: Simulator, count: int, rng: np.random.Generator, box: Floats | None = None) -> Floats:
+    """The same, or those that were found: fewer, perhaps none."""
     cell = simulator.cell
     low, high = (cell.reach if box is None else box).T
     sigma = cell.spec.noise_m
     found: list[Floats] = []
     for _ in range(_TRIES):
-        drawn = completed(cell, rng.uniform(low, high, (40 * count, len(low))))
-        drawn = drawn[within_stroke(simulator, drawn)][: count + count // 2]
-        if len(drawn):
-            found.extend(drawn[worth(simulator, drawn, sigma)])
+        tried = completed(cell, rng.uniform(low, high, (40 * count, len(low))))
+        tried = tried[within_stroke(simulator, tried)][: count + count // 2]
+        if len(tried):
+            found.extend(tried[worth(simulator, tried, sigma)])
         if len(found) >= count:
-            return np.array(found[:count])
-    raise DataError(f"{cell.name}: only {len(found)} shots were found that move something and are not chaotic")
+            break
+    return np.array(found[:count]).reshape(-1, len(cell.input_names))
 
 
 def within_stroke(simulator: Simulator, inputs: Floats) -> Bools:

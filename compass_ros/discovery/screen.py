@@ -82,6 +82,12 @@ class Space:
             axis=3,
         )
 
+    @property
+    def told(self) -> tuple[Floats, Floats, Floats]:
+        """(P,) values, (E, A) inputs and (E, F) times of the recordings, from which sizes of laws follow."""
+        cell = len(self.simulator.cell.parameters)
+        return self.fit.point.values[:cell], self.likelihood.inputs, self.likelihood.time_s
+
     def weights(self, candidate: Candidate, shapes: Floats, direction: Floats) -> Floats:
         """(E, H, n) accelerations at all moments per unit of each of n amplitudes, for forces.
 

@@ -12,9 +12,9 @@ from compass_ros.discovery.screen import Space
 from compass_ros.types import Channel, Floats, Phase, Region, Where
 
 _SIZES = (1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
-"""Prior sizes of a flexible push that are tried [m/s^2]."""
+"""Prior sizes of a flexible push that are tried [m/s^2; of a joint its unit, `Impulses.push`]."""
 _LENGTH = 0.12
-"""Distance over which a flexible push is alike [m]."""
+"""Distance over which a flexible push is alike [m; of a joint `Impulses.length`]."""
 _SHARED = 0.5
 """Part of a push's variance that is the same for all movers at one place and time; the rest is each mover's own."""
 _CLEARLY = 10.0
@@ -58,7 +58,7 @@ def whereabouts(space: Space, choice: Choice) -> tuple[Where, bool]:
 def _kernel(space: Space, objects: tuple[str, ...]) -> Floats:
     """(E K N, E K N) covariance of a push at all moments of all episodes: smooth in place, so episodes share it."""
     pushes = space.pushes
-    place = pushes.paths[..., :2].reshape(-1, 2)
+    place = (pushes.paths[..., :2] / pushes.length[:, None]).reshape(-1, 2)
     time = np.broadcast_to(pushes.moments[None, :, None], pushes.paths.shape[:3]).ravel()
     acts = np.array([m in objects for m in pushes.movers])
     on = np.broadcast_to(acts, pushes.paths.shape[:3]).ravel().astype(float)
@@ -72,7 +72,8 @@ def _kernel(space: Space, objects: tuple[str, ...]) -> Floats:
 
 def _push(space: Space, objects: tuple[str, ...]) -> _Push:
     """The flexible push of the prior size that explains most."""
-    shape = space.pushes.paths.shape[:3]
+    pushes = space.pushes
+    shape = pushes.paths.shape[:3]
     kernel = _kernel(space, objects)
     root = np.linalg.cholesky(kernel + 1e-6 * np.eye(len(kernel)))
     keep = min(120, len(root))
@@ -81,7 +82,7 @@ def _push(space: Space, objects: tuple[str, ...]) -> _Push:
     both = np.zeros((*shape, 2, 2 * keep))
     both[..., 0, :keep] = basis
     both[..., 1, keep:] = basis
-    weights = both.reshape(shape[0], -1, 2 * keep)
+    weights = (both * pushes.push[:, None, None]).reshape(shape[0], -1, 2 * keep)
     matrix, pull = space.reduced(weights)
     kappa = space.likelihood.correlation_time
     best = _Push(-np.inf, np.zeros((*shape, 2)))
@@ -95,7 +96,9 @@ def _push(space: Space, objects: tuple[str, ...]) -> _Push:
 
 
 def _region(space: Space, push: _Push) -> Region | None:
-    """A disc that holds most of the push's strength, where it is clearly smaller than the table."""
+    """A disc that holds most of the push's strength, where it is clearly smaller than the table; none of joints."""
+    if space.pushes.joints.any():
+        return None
     strength = np.sum(push.mean**2, axis=3).ravel()
     place = space.pushes.paths[..., :2].reshape(-1, 2)
     if strength.sum() <= 0:

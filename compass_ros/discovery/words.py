@@ -23,6 +23,8 @@ IN_WORDS: dict[Phase, str] = {
     "object_contact": "In contacts between objects",
     "all": "Throughout",
 }
+OF_JOINTS = IN_WORDS | {"strike": "In the drive", "free": "In the motion", "wall_contact": "In contacts"}
+"""The same where nothing slides on a table."""
 
 
 def where_of(attached: Attached, numbers: Floats, movers: Sequence[str]) -> Where:
@@ -30,7 +32,8 @@ def where_of(attached: Attached, numbers: Floats, movers: Sequence[str]) -> Wher
     effect = attached.effect
     phase = PHASE.get(effect.name, OF_CHANNEL[effect.channel])
     objects = attached.objects
-    one = objects[0] if len(objects) == 1 and (len(movers) > 1 or effect.on == "walls") else "all"
+    told = len(movers) > 1 or not effect.moves
+    one = objects[0] if len(objects) == 1 and told else "all"
     names = [q.name for q in effect.quantities]
     region = None
     if "centre_x" in names:
@@ -40,9 +43,12 @@ def where_of(attached: Attached, numbers: Floats, movers: Sequence[str]) -> Wher
     return Where(one, phase, effect.channel, region)
 
 
-def place(where: Where) -> str:
-    """The place in words: 'On free slides of puck1, within 12 cm of (0.02, -0.01)'."""
-    words = IN_WORDS[where.phase]
+def place(where: Where, flat: bool = True) -> str:
+    """The place in words: 'On free slides of puck1, within 12 cm of (0.02, -0.01)'.
+
+    `flat`: something slides on a table.
+    """
+    words = (IN_WORDS if flat else OF_JOINTS)[where.phase]
     if where.object != "all":
         words += f" of {where.object}"
     if where.region:

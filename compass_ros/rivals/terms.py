@@ -47,7 +47,7 @@ def named_effects(simulator: Simulator, movers: Sequence[str]) -> list[Effect]:
     return [
         effect
         for name, effect in EFFECTS.items()
-        if effect.channel == "dynamics" and effect.on == "objects" and effect.forces is not None
+        if effect.channel == "dynamics" and effect.moves and effect.forces is not None
         and name != NUISANCE and simulator.accepts(effect, movers)
     ]  # fmt: skip
 

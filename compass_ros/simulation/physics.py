@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import mujoco
 import numpy as np
@@ -12,10 +12,12 @@ import numpy as np
 from compass_ros.cells import Cell
 from compass_ros.cells.drives import Drive, Drives
 from compass_ros.cells.dynamics import Dynamics
+from compass_ros.cells.signals import Signal
 from compass_ros.simulation.effects.attached import Attached
-from compass_ros.simulation.effects.effect import Context, Sample, restore
-from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.types import Floats, Parameter
+from compass_ros.simulation.effects.effect import Context, Sample, restore, table_friction
+from compass_ros.simulation.native.program import Term
+from compass_ros.simulation.sites import Places, Site, SiteKind
+from compass_ros.types import Bools, Floats, Parameter
 
 
 @dataclass(frozen=True)
@@ -28,14 +30,19 @@ class Physics:
 
     cell: Cell
     dynamics: Dynamics
+    places: Places
     effects: tuple[Attached, ...]
     drives: Drives
     bank: tuple[Drive, ...] = ()
     """Recorded inputs; the input `window` says which of them a rollout has."""
 
     def __post_init__(self) -> None:
-        for attached in self.effects:
-            attached.check(self.model)
+        self._sites  # noqa: B018 - raises where an effect cannot act
+
+    @cached_property
+    def _sites(self) -> tuple[tuple[Site, ...], ...]:
+        """What each effect acts on."""
+        return tuple(attached.sites(self.places) for attached in self.effects)
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -63,45 +70,39 @@ class Physics:
             at += size
         return out
 
+    def acting(self, values: Floats) -> list[tuple[Attached, Floats, tuple[Site, ...]]]:
+        """The same with the sites of each."""
+        return [(*one, sites) for one, sites in zip(self.of_effects(values), self._sites, strict=True)]
+
     def of_command(self, inputs: Floats) -> Floats:
         """The part of the inputs that the cell knows."""
         return inputs[:, : len(self.cell.input_names)]
 
-    def context(self, attached: Attached, values: Floats) -> Context:
-        """What the hooks of an effect are told."""
-        planes: list[tuple[int, int]] = []
-        positions: list[int] = []
-        for signal in self.cell.signals:
-            if not signal.places:
-                continue
-            positions.extend(
-                range(signal.first, signal.first + (signal.size if signal.jointed else min(signal.size, 3)))
-            )
-            if not signal.jointed:
-                planes.append((signal.first, signal.first + 1))
+    def context(self, sites: tuple[Site, ...], values: Floats) -> Context:
+        """What the hooks of an effect on some sites are told."""
+        bodies = [signal for signal in self.cell.signals if signal_kind(signal) == "camera"]
+        planes = tuple((signal.first, signal.first + 1) for signal in bodies)
+        positions = tuple(c for s in bodies for c in range(s.first, s.first + min(s.size, 3)))
         sliding = {s.body: s for s in self.dynamics.sliding(self.of_cell(values))}
-        return Context(attached.objects, sliding, tuple(planes), tuple(positions), self.time_step)
+        return Context(sites, sliding, planes, positions, self.time_step)
 
     def write(self, models: Sequence[mujoco.MjModel], values: Floats) -> None:
         """Parameters and effects into B models. What MuJoCo derives from them (mj_setConst) is the caller's."""
         for model in models:
             restore(model, self.model)
         self.dynamics.apply(models, self.of_cell(values))
-        for attached, numbers in self.of_effects(values):
+        for attached, numbers, sites in self.acting(values):
             if attached.effect.model is not None:
-                context = self.context(attached, values)
+                context = self.context(sites, values)
                 for model, of_rollout in zip(models, numbers, strict=True):
                     attached.effect.model(model, of_rollout, context)
 
     def terms(self, values: Floats) -> list[Term]:
         """Friction of the table and forces of the effects."""
-        terms = [
-            Term(Kind.TABLE_FRICTION, s.body, np.stack([s.friction, s.creep, s.load], axis=1))
-            for s in self.dynamics.sliding(self.of_cell(values))
-        ]
-        for attached, numbers in self.of_effects(values):
+        terms = [table_friction(s, self.places) for s in self.dynamics.sliding(self.of_cell(values))]
+        for attached, numbers, sites in self.acting(values):
             if attached.effect.forces is not None and attached.present(numbers):
-                terms.extend(attached.effect.forces(numbers, self.context(attached, values)))
+                terms.extend(attached.effect.forces(numbers, self.context(sites, values)))
         return terms
 
     def start(self, values: Floats, inputs: Floats) -> Floats:
@@ -114,22 +115,40 @@ class Physics:
         return start
 
     def controls(self, values: Floats, inputs: Floats, steps: int) -> Floats | None:
-        """(B, T, n) what drives MuJoCo (`drives.parts`), controls as the arm follows them; None where nothing does."""
+        """(B, T, n) what drives MuJoCo (`drives.parts`), controls as the drives follow them; None where nothing does."""
         if not self.drives.size:
             return None
         nu, command = self.model.nu, self.of_command(inputs)
         driven = self.dynamics.controls(self.of_cell(values), command, steps)
         if self.cell.spec.inputs:
             driven = self.drives.fill(driven, self.of_cell(values), command, self.bank, self.time_step)
-        controls = driven[..., :nu]
+        controls, recorded = driven[..., :nu], {name for i in self.cell.spec.inputs for name in i.targets}
         drawn = list(inputs[:, len(self.cell.input_names) :, None].transpose(1, 0, 2))
-        for attached, numbers in self.of_effects(values):
+        for attached, numbers, sites in self.acting(values):
             if attached.effect.controls is not None:
                 own = drawn.pop(0) if attached.effect.scattered and drawn else numbers
-                controls = attached.effect.controls(controls, own, self.context(attached, values))
-        if driven.shape[2] > nu:
-            controls = np.concatenate([controls, driven[..., nu:]], axis=2)
-        return np.ascontiguousarray(controls)
+                context = self.context(sites, values)
+                for drive in sites:
+                    columns = list(drive.actuators)
+                    before = controls[:, 0, columns] if recorded & set(drive.names) else None
+                    before = self._standing(drive, values, inputs) if before is None else before
+                    told = replace(context, sites=(drive,), before=before)
+                    controls[:, :, columns] = attached.effect.controls(controls[:, :, columns], own, told)
+        return np.ascontiguousarray(driven)
+
+    def _standing(self, drive: Site, values: Floats, inputs: Floats) -> Floats | None:
+        """(B, 1) the command at which a position servo stands at the start; None for other drives, which rest at 0."""
+        if drive.kind != "position_drive":
+            return None
+        (actuator,), model = drive.actuators, self.model
+        gain, (bias, stiffness, _) = model.actuator_gainprm[actuator, 0], model.actuator_biasprm[actuator, :3]
+        data, first = mujoco.MjData(model), self.start(values, inputs)[:, 1 : 1 + model.nq]
+        out = np.empty((len(first), 1))
+        for i, positions in enumerate(first):
+            data.qpos[:] = positions
+            mujoco.mj_fwdPosition(model, data)
+            out[i] = -(bias + stiffness * data.actuator_length[actuator]) / gain
+        return out
 
     def duration(self, values: Floats, inputs: Floats, time_s: Floats) -> float:
         """How long to simulate for what the tracker is asked at (B, F) times [s]."""
@@ -146,10 +165,36 @@ class Physics:
             return interpolate(states, self.time_step, self.cell.simulated_time(self.of_command(inputs), time), observe)
 
         sample: Sample = perfect
-        for attached, numbers in self.of_effects(values):
+        for attached, numbers, sites in self.acting(values):
             if attached.effect.sensing is not None:
-                sample = attached.effect.sensing(sample, numbers, self.context(attached, values))
+                sensed = attached.effect.sensing(sample, numbers, self.context(sites, values))
+                sample = _where(self._of_signals(sites), sensed, sample)
         return np.asarray(sample(time_s))
+
+    def _of_signals(self, sites: tuple[Site, ...]) -> Bools:
+        """(C,) which columns of an observation belong to some signals."""
+        kinds = {site.kind for site in sites}
+        return np.concatenate([np.full(s.size, signal_kind(s) in kinds) for s in self.cell.signals])
+
+
+def signal_kind(signal: Signal) -> SiteKind:
+    """What measures a signal."""
+    if signal.jointed:
+        return "encoder"
+    return "camera" if signal.places else "sensor"
+
+
+def places_of(cell: Cell, dynamics: Dynamics) -> Places:
+    """The sites of a cell's scene."""
+    sliding = frozenset(s.body for s in dynamics.sliding(cell.defaults[None]))
+    return Places(dynamics.model, sliding, tuple(dict.fromkeys(map(signal_kind, cell.signals))))
+
+
+def _where(columns: Bools, sensed: Sample, before: Sample) -> Sample:
+    """What one sensor says in its columns, and in the others what was said before."""
+    if columns.all():
+        return sensed
+    return lambda time: np.where(columns, sensed(time), before(time))
 
 
 def interpolate(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -14,13 +15,14 @@ from compass_ros.cells.drives import Drive, Drives
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.cells.sensors import units_of
 from compass_ros.cells.signals import Signal
-from compass_ros.errors import ConfigError
 from compass_ros.simulation.alike import roll_alike
 from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.effect import Effect
-from compass_ros.simulation.native.program import evaluate, mover_masses, path_columns, slides_or_turns
-from compass_ros.simulation.physics import Physics, interpolate
+from compass_ros.simulation.native.program import evaluate, path_columns
+from compass_ros.simulation.physics import Physics, interpolate, places_of
 from compass_ros.simulation.player import Player
+from compass_ros.simulation.sites import JOINTS, Places, Site
+from compass_ros.simulation.sizes import DriveSize, JointSize, command_unit, joint_sizes
 from compass_ros.types import Floats, Ints, Parameter, Unit
 
 CHUNK = 128
@@ -54,7 +56,8 @@ class Simulator:
         dynamics = dynamics_of(cell)
         for name, value in (options or {}).items():
             setattr(dynamics.model.opt, name, value)
-        self.physics = Physics(cell, dynamics, tuple(effects), Drives(cell, dynamics.model))
+        drives = Drives(cell, dynamics.model)
+        self.physics = Physics(cell, dynamics, places_of(cell, dynamics), tuple(effects), drives)
         self._player = Player(dynamics.model, threads)
 
     @property
@@ -139,47 +142,70 @@ class Simulator:
         """(D,) unit of each number of each signal."""
         return {s: units_of(self.physics.model, s, str(self.cell.path)) for s in self.cell.signals}
 
-    def movers(self) -> tuple[str, ...]:
-        """Tracked bodies that slide in the plane and tracked joints: what a force along the way can act on."""
-        names = dict.fromkeys(name for signal in self.cell.signals if signal.places for name in signal.at)
-        return tuple(name for name in names if slides_or_turns(self.physics.model, name))
+    @property
+    def places(self) -> Places:
+        """Where physics can act in the scene."""
+        return self.physics.places
 
-    def walls(self) -> tuple[str, ...]:
-        """Fixed geoms that a tracked body can touch."""
-        model = self.physics.model
-        pairs = [(model.pair_geom1[i], model.pair_geom2[i]) for i in range(model.npair)]
-        fixed = {int(g) for pair in pairs for g in pair if model.body_weldid[model.geom_bodyid[g]] == 0}
-        return tuple(model.geom(g).name for g in sorted(fixed) if model.geom(g).name)
+    def movers(self) -> tuple[str, ...]:
+        """Names of tracked bodies that slide in the plane and of tracked joints: what a force along the way acts on."""
+        return tuple(self.moving)
+
+    @cached_property
+    def moving(self) -> Mapping[str, Site]:
+        """The same as sites. A joint that is called as a tracked body is left out: what pushes the body pushes it."""
+        tracked = [(name, signal.jointed) for signal in self.cell.signals if signal.places for name in signal.at]
+        found: dict[str, Site] = {}
+        for name, jointed in sorted(tracked, key=lambda one: one[1]):
+            site = self.places.joint(name) if jointed else self.places.body(name)
+            if site is not None and site.kind != "body":
+                found.setdefault(name, site)
+        return {name: found[name] for name in dict.fromkeys(name for name, _ in tracked) if name in found}
 
     def accepts(self, effect: Effect, objects: Sequence[str]) -> bool:
-        """Whether an effect can act on these objects here."""
-        model, trial = self.physics.model, Attached(effect, tuple(objects))
-        try:
-            trial.check(model)
-            context = self.physics.context(trial, self.defaults[None])
-            if effect.forces is not None:
-                effect.forces(np.array([[q.start or q.scale for q in effect.quantities]]), context)
-            if effect.model is not None:
-                effect.model(copy.copy(model), np.array([q.scale for q in effect.quantities]), context)
-        except ConfigError:
-            return False
-        return True
+        """Whether these objects are sites of a kind on which an effect can act."""
+        return not Attached(effect, tuple(objects)).objection(self.places)
 
     def masses(self, values: Floats, names: Sequence[str]) -> Floats:
-        """(N,) mass of each mover at (P,) values [kg]; 1 for joints, on which forces are torques."""
-        return mover_masses(self._player.written(self.physics, values[None])[0], names)
+        """(N,) mass of each body in the plane at (P,) values [kg]."""
+        model = self._player.written(self.physics, values[None])[0]
+        return np.array([model.body_mass[model.body(name).id] for name in names])
+
+    def joint_sizes(self, values: Floats, inputs: Floats, time_s: Floats) -> dict[str, JointSize]:
+        """How each tracked joint moves, and what moves it, in (E, A) inputs up to (E, F) times [s], at (P,) values."""
+        joints = {name: site for name, site in self.moving.items() if site.kind in JOINTS}
+        if not joints:
+            return {}
+        tiled = np.tile(values, (len(inputs), 1))
+        steps = self._steps(self.physics.duration(tiled, inputs, time_s))
+        start, controls = self.physics.start(tiled, inputs), self.physics.controls(tiled, inputs, steps)
+        states = self._player.play(self.physics, tiled, start, controls, steps)[0]
+        model, noise = self._player.written(self.physics, values[None])[0], self.cell.spec.noise_m
+        noises = {name: s.noise or noise for s in self.cell.signals if s.jointed and s.places for name in s.at}
+        return joint_sizes(model, joints, states, (controls, self.physics.drives.parts), noises)
+
+    def drive_size(self, drives: Sequence[Site], values: Floats, inputs: Floats, time_s: Floats) -> DriveSize:
+        """What drives of one kind are told in (E, A) inputs up to (E, F) times [s], at (P,) values."""
+        tiled = np.tile(values, (len(inputs), 1))
+        plain = replace(self.physics, effects=())
+        controls = plain.controls(tiled, inputs, self._steps(plain.duration(tiled, inputs, time_s)))
+        told = [np.linalg.norm(controls[:, :, list(d.actuators)], axis=2).max() for d in drives if controls is not None]
+        return DriveSize(drives[0].kind, float(max(told)), command_unit(self.physics.model, drives[0]))
 
     def forces(self, attached: Attached, numbers: Floats, values: Floats, states: Floats) -> dict[str, Floats]:
         """(B, F, 2) force of an effect on each mover in given states.
 
         (B, q) numbers, (P,) values of the cell, (B, F, N, 6) states x, y, vx, vy, mass, time of the effect's N objects.
+        Of a joint: (angle, 0, rate, 0, anything, time), and its torque in the first place.
         """
-        context = self.physics.context(attached, np.tile(values, (len(numbers), 1)))
+        context = self.physics.context(attached.sites(self.places), np.tile(values, (len(numbers), 1)))
         terms = attached.effect.forces(numbers, context) if attached.effect.forces else ()
         gravity = -float(self.physics.model.opt.gravity[2])
         out = {name: np.zeros((*states.shape[:2], 2)) for name in attached.objects}
         for term in terms:
-            out[term.object] += evaluate(term, states[:, :, attached.objects.index(term.object)], gravity)
+            if term.site is not None:
+                name = term.site.name
+                out[name] += evaluate(term, states[:, :, attached.objects.index(name)], gravity)
         return out
 
     def motion(self, values: Floats, inputs: Floats, duration: float) -> Motion:
@@ -233,7 +259,7 @@ class Simulator:
         columns: list[int] = []
         rest: list[tuple[float, float, float, float]] = []
         for name in names:
-            own, offset = path_columns(self.physics.model, name)
+            own, offset = path_columns(self.physics.model, self.moving[name])
             columns.extend(own)
             rest.append(offset)
         states = self._roll(values, inputs, float(np.max(time_s)), np.maximum(columns, 0))

@@ -57,7 +57,7 @@ def test_nothing_is_missing_and_the_sentence_says_what_the_table_says() -> None:
 
 def test_every_effect_says_whether_it_can_act_on_a_joint_that_no_body_is_named_after() -> None:
     simulator = Simulator(CELL, threads=1)
-    able = {name for name, effect in EFFECTS.items() if effect.on == "objects" and simulator.accepts(effect, ["swing"])}
+    able = {name for name, effect in EFFECTS.items() if effect.moves and simulator.accepts(effect, ["swing"])}
     assert {"coulomb_friction", "viscous_drag"} <= able
     assert "off_centre_mass" not in able
 

@@ -14,8 +14,9 @@ from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.types import Floats
 from test.concealed.scene import INPUTS, TIMES, cell, distance, ingredient, table, tracks
 
-SAME = ("coulomb_friction", "friction_cone")
-"""Effects of the library that this cell cannot show: its own sliding friction, and a choice that its contacts lack."""
+SAME = ("coulomb_friction", "friction_cone", "spring", "latency")
+"""Effects of the library that this cell cannot show: its own sliding friction, a choice that its contacts lack, and
+those of joints and encoders."""
 LOOSE = {
     "rate_dependent_restitution": 0.35,  # decided at the first touch here, at every moment there
     "tangential_impulse": 0.10,  # a true Coulomb limit here, faded at 10 mm/s there

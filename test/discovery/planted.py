@@ -11,6 +11,7 @@ import numpy as np
 from compass_ros.calibration.least_squares import Fit, Point, linearise, start
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import ROBUST
+from compass_ros.discovery.candidates import Candidate, candidates
 from compass_ros.discovery.impulses import impulses
 from compass_ros.discovery.joint import Joint, widened
 from compass_ros.discovery.planned import perfect
@@ -33,6 +34,12 @@ FREE = (
     "env@camera@bias_x",
     "env@camera@bias_y",
 )
+
+
+@cache
+def asked_of_table() -> tuple[Candidate, ...]:
+    """All laws that can act there."""
+    return candidates(simulator(), simulator().defaults, CALM, np.tile(np.linspace(0, 2.5, 50), (len(CALM), 1)))
 
 
 def recorded(effect: Attached | None, numbers: Sequence[float], shots: Floats = CALM, seed: int = 0) -> Likelihood:

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from compass_ros.discovery.anew import beginning, contacts_anew
-from compass_ros.discovery.candidates import Candidate, candidates
+from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.screen import Score
 from compass_ros.discovery.trials import worth
 from compass_ros.simulation.effects import EFFECTS, Attached
-from test.discovery.planted import CALM, HELD_OUT, PUCKS, planned_space, recorded, space_of
-from test.simulation.table import simulator
+from test.discovery.planted import CALM, HELD_OUT, PUCKS, asked_of_table, planned_space, recorded, space_of
 
 SLOPE = Attached(EFFECTS["rate_dependent_restitution"], ())
 LUMP = Attached(EFFECTS["off_centre_mass"], ("puck1",))
@@ -27,7 +26,7 @@ def test_an_effect_of_contacts_of_which_first_order_knows_nothing_is_found() -> 
     likelihood = recorded(SLOPE, [0.5], np.concatenate([CALM, HELD_OUT]))
     scores = [
         Score(c, np.array([q.start for q in c.attached.effect.quantities]), 0.0, np.zeros(likelihood.measured.size))
-        for c in candidates(simulator())
+        for c in asked_of_table()
         if c.name in ("off_centre_mass", "tangential_impulse", "rate_dependent_restitution", "table_tilt")
     ]
     best = min(contacts_anew(space_of(likelihood), scores), key=worth)

@@ -11,7 +11,7 @@ from compass_ros.calibration.least_squares import cost, minimise
 from compass_ros.calibration.refine import refine
 from compass_ros.discovery import choose
 from compass_ros.discovery.beginning import begun, in_place_of
-from compass_ros.discovery.candidates import Candidate, candidates
+from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.choice import undecided
 from compass_ros.discovery.choose import _contested, _in_its_place, _with_second
 from compass_ros.discovery.joint import fit_jointly
@@ -19,7 +19,17 @@ from compass_ros.discovery.pairs import of_singles, one_of, with_contacts
 from compass_ros.discovery.screen import Score
 from compass_ros.discovery.unseen import held_out
 from compass_ros.simulation.effects import EFFECTS, Attached
-from test.discovery.planted import CALM, HELD_OUT, PUCKS, joint, planned_space, recorded, recorded_with, space_of
+from test.discovery.planted import (
+    CALM,
+    HELD_OUT,
+    PUCKS,
+    asked_of_table,
+    joint,
+    planned_space,
+    recorded,
+    recorded_with,
+    space_of,
+)
 from test.simulation.table import simulator
 
 SWIRL = Attached(EFFECTS["swirl"], PUCKS)
@@ -67,7 +77,7 @@ def test_what_an_impact_loses_is_found_beside_a_latency_though_dampings_take_it_
     plain = refine(likelihood, simulator().defaults)
     fit = plain.fit
     first = begun(simulator(), plain.likelihood, fit.point, fit.free, fit.robust, Candidate(latency))
-    asked = [c for c in candidates(simulator()) if c.name in ("rate_dependent_restitution", "tangential_impulse")]
+    asked = [c for c in asked_of_table() if c.name in ("rate_dependent_restitution", "tangential_impulse")]
     (best,) = with_contacts(first, asked, 1.0)
     assert best.added == (latency, slope)
     assert best.fit.point.cost < first.fit.point.cost - 30.0
@@ -87,7 +97,7 @@ def test_contacts_are_asked_where_first_order_knows_no_second_effect(monkeypatch
         for a, n in ((latency, [0.03]), (TILT, [1e-5, 1e-5]))
     ]
     monkeypatch.setattr(choose, "promising_pairs", lambda *_: [fit_jointly(space, scores, 4)])
-    asked = [c for c in candidates(simulator()) if c.name in ("rate_dependent_restitution", "tangential_impulse")]
+    asked = [c for c in asked_of_table() if c.name in ("rate_dependent_restitution", "tangential_impulse")]
     choice = _with_second(undecided(space).of([first]), asked, unseen)
     assert choice.two
     assert choice.pair is not None

@@ -13,7 +13,7 @@ from test.simulation.table import cell, simulator
 
 
 def model(name: str, *numbers: float) -> Joint:
-    objects = PUCKS if EFFECTS[name].on == "objects" else ()
+    objects = PUCKS if EFFECTS[name].moves else ()
     return joint(planned_space(), Attached(EFFECTS[name], objects), numbers)
 
 

@@ -8,13 +8,12 @@ import pytest
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import refine
-from compass_ros.discovery.candidates import candidates
 from compass_ros.discovery.noticed import noticed
 from compass_ros.discovery.null import simulate_null
 from compass_ros.discovery.tangents import screen
 from compass_ros.discovery.unseen import held_out
 from compass_ros.simulation.effects import EFFECTS, Attached
-from test.discovery.planted import HELD_OUT, PUCKS, SIGMA, recorded
+from test.discovery.planted import HELD_OUT, PUCKS, SIGMA, asked_of_table, recorded
 from test.simulation.table import simulator
 
 DRAG = Attached(EFFECTS["viscous_drag"], PUCKS)
@@ -25,7 +24,7 @@ NOISE = Noise(np.full(4, SIGMA), 0.0)
 def test_what_hardly_moves_the_fitted_shots_matters_where_it_moves_others() -> None:
     """A drag of 0.2 mm in the fitted shots stands out from the noise; a tracker may be as wrong by itself."""
     plain = refine(recorded(DRAG, [0.016]), simulator().defaults)
-    space, scores = screen(simulator(), plain.likelihood, plain.fit, candidates(simulator()))
+    space, scores = screen(simulator(), plain.likelihood, plain.fit, asked_of_table())
     null = simulate_null(space, scores, NOISE, 0)
     assert scores[0].gain > 1.2 * null.largest
 

@@ -52,7 +52,7 @@ def left_over(attached: Attached, numbers: Floats) -> float:
 
 @pytest.mark.parametrize("name", ["viscous_drag", "camera_latency", "camera_scale"])
 def test_five_sigma_is_five_sigma_in_a_rollout(seen: dict[str, Visible], name: str) -> None:
-    objects = PUCKS if EFFECTS[name].on == "objects" else ()
+    objects = PUCKS if EFFECTS[name].moves else ()
     assert left_over(Attached(EFFECTS[name], objects), np.array([seen[name].at_five_sigma])) == pytest.approx(
         5, rel=0.15
     )

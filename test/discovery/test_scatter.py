@@ -7,14 +7,14 @@ import pytest
 
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery import choose
-from compass_ros.discovery.candidates import candidates, scattered
+from compass_ros.discovery.candidates import scattered
 from compass_ros.discovery.choice import Choice, undecided
 from compass_ros.discovery.choose import _with_scatter
 from compass_ros.discovery.scatter import BY_CHANCE, bent_by, spreads
 from compass_ros.discovery.unseen import HeldOut, held_out
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.types import Floats
-from test.discovery.planted import CALM, HELD_OUT, PUCKS, recorded_with, space_of
+from test.discovery.planted import CALM, HELD_OUT, PUCKS, asked_of_table, recorded_with, space_of
 from test.simulation.table import actions, cell, simulator, values
 
 JITTER, SWIRL = Attached(EFFECTS["stroke_jitter"], ()), Attached(EFFECTS["swirl"], PUCKS)
@@ -50,7 +50,7 @@ def test_a_tilt_is_found_beside_deviations(monkeypatch: pytest.MonkeyPatch) -> N
 
     space = space_of(both(DEVIATION, SHOTS))
     unseen = held_out(both(np.array([0.03, -0.02]), HELD_OUT, 1), space.likelihood, space.fit)
-    asked = [c for c in candidates(simulator()) if c.name in ("table_tilt", "friction_gradient")]
+    asked = [c for c in asked_of_table() if c.name in ("table_tilt", "friction_gradient")]
     pair = _with_scatter(undecided(space), space, asked, unseen).verdict(unseen)
     assert pair is not None
     assert pair.added == (JITTER, tilt)
@@ -107,5 +107,5 @@ def test_a_scatter_that_does_not_predict_is_dropped() -> None:
 
 
 def test_a_scatter_is_no_law() -> None:
-    assert "stroke_jitter" not in {c.name for c in candidates(simulator())}
-    assert [c.name for c in scattered(simulator())] == ["stroke_jitter"]
+    assert "stroke_jitter" not in {c.name for c in asked_of_table()}
+    assert [c.name for c in scattered(simulator(), simulator().defaults, actions(3), np.tile(np.linspace(0, 2.5, 50), (3, 1)))] == ["stroke_jitter"]

@@ -8,6 +8,7 @@ import numpy as np
 
 from compass_ros.cells import Cell, load
 from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import Attached, Effect
 from compass_ros.types import Floats
 
 DESCRIBED = np.array([-0.225, 0.075, 0.0, 0.45])
@@ -24,6 +25,13 @@ def cell() -> Cell:
 @cache
 def simulator() -> Simulator:
     return Simulator(cell(), threads=2)
+
+
+def attached(kind: Effect) -> Attached:
+    """An effect on all of the table that it can act on, on one wall of those."""
+    if kind.on_walls:
+        return Attached(kind, ("right_wall",))
+    return Attached(kind, ("puck1", "puck2") if kind.moves else ())
 
 
 def actions(count: int, seed: int = 0) -> Floats:

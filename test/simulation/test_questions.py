@@ -13,7 +13,7 @@ PUCKS = ("puck1", "puck2")
 
 def test_pucks_move_and_walls_and_bar_stand() -> None:
     assert simulator().movers() == PUCKS
-    assert set(simulator().walls()) == {"front_wall", "back_wall", "left_wall", "right_wall", "obstacle"}
+    assert set(simulator().places.walls) == {"front_wall", "back_wall", "left_wall", "right_wall", "obstacle"}
     assert simulator().actuated
 
 

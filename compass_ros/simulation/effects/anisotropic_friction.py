@@ -6,19 +6,13 @@ on the table. Source: Zmitrowicz 2006, friction tensors of second order; the iso
 
 from __future__ import annotations
 
-import numpy as np
-
-from compass_ros.simulation.effects.effect import Context, Effect, Quantity, creep_and_load
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity, friction
 from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.types import Floats
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    terms = []
-    for name in context.objects:
-        creep, load = creep_and_load(context, name)
-        terms.append(Term(Kind.ANISOTROPIC, name, np.hstack([numbers, creep, load])))
-    return tuple(terms)
+    return friction(Kind.ANISOTROPIC, context, numbers)
 
 
 EFFECT = Effect(
@@ -29,5 +23,6 @@ EFFECT = Effect(
         Quantity("diagonal", "1", -0.1, 0.1, 0.005),
     ),
     sentence="friction that depends on the direction of motion",
+    on=("table",),
     forces=_forces,
 )

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import copy
 import weakref
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
 from compass_ros.errors import ConfigError
-from compass_ros.simulation.effects.effect import Context, restore
-from compass_ros.simulation.effects.exported import Exported
-from compass_ros.simulation.native.program import Kind, Programs, Term
+from compass_ros.simulation.effects.effect import Context, restore, table_friction
+from compass_ros.simulation.effects.exported import Exported, FittedEffect
+from compass_ros.simulation.native.program import Programs, Term
+from compass_ros.simulation.sites import Places
 
 
 class Attachment:
@@ -38,12 +40,13 @@ def attach(model: mujoco.MjModel, data: mujoco.MjData, exported: Exported) -> At
     effects of the command or of the sensor, which act outside the model, where the model lacks an object, and where it
     has effects attached already.
     """
-    programs = Programs([model], _terms(model, exported))
+    places = Places(model, frozenset(exported.sliding))
+    acting = [(fitted, _context(places, exported, fitted)) for fitted in exported.effects]
+    programs = Programs([model], _terms(places, exported, acting))
     before = copy.copy(model)
     try:
-        for fitted in exported.effects:
+        for fitted, context in acting:
             if fitted.attached.effect.model is not None:
-                context = _context(model, exported, fitted.attached.objects)
                 fitted.attached.effect.model(model, np.array(fitted.values), context)
         programs.__enter__()
     except ConfigError:
@@ -54,23 +57,20 @@ def attach(model: mujoco.MjModel, data: mujoco.MjData, exported: Exported) -> At
     return Attachment(model, before, programs)
 
 
-def _terms(model: mujoco.MjModel, exported: Exported) -> list[Term]:
-    terms = [
-        Term(Kind.TABLE_FRICTION, s.body, np.stack([s.friction, s.creep, s.load], axis=1))
-        for s in exported.sliding.values()
-    ]
-    for fitted in exported.effects:
-        kind = fitted.attached.effect
-        if kind.model is None and kind.forces is None:
-            raise ConfigError(f"effect '{kind.name}' belongs to the {kind.channel}, outside the model; apply it there")
-        fitted.attached.check(model)
-        if kind.forces is not None:
-            terms.extend(kind.forces(np.array([fitted.values]), _context(model, exported, fitted.attached.objects)))
+def _terms(places: Places, exported: Exported, acting: Sequence[tuple[FittedEffect, Context]]) -> list[Term]:
+    terms = [table_friction(s, places) for s in exported.sliding.values()]
+    for fitted, context in acting:
+        if fitted.attached.effect.forces is not None:
+            terms.extend(fitted.attached.effect.forces(np.array([fitted.values]), context))
     return terms
 
 
-def _context(model: mujoco.MjModel, exported: Exported, objects: tuple[str, ...]) -> Context:
-    return Context(objects, exported.sliding, (), (), float(model.opt.timestep))
+def _context(places: Places, exported: Exported, fitted: FittedEffect) -> Context:
+    kind = fitted.attached.effect
+    if kind.model is None and kind.forces is None:
+        raise ConfigError(f"effect '{kind.name}' belongs to the {kind.channel}, outside the model; apply it there")
+    sites = fitted.attached.sites(places)
+    return Context(sites, exported.sliding, (), (), float(places.model.opt.timestep))
 
 
 def _end(model: mujoco.MjModel, before: mujoco.MjModel, programs: Programs) -> None:

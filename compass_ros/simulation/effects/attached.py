@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
-from compass_ros.errors import ConfigError, nearest
+from compass_ros.errors import ConfigError
 from compass_ros.simulation.effects.effect import Effect
+from compass_ros.simulation.sites import Places, Site
 from compass_ros.types import Bools, Floats, Parameter
 
 
 @dataclass(frozen=True)
 class Attached:
-    """An effect on certain objects (bodies, joints, or one fixed geom for effects on walls)."""
+    """An effect on certain objects: joints, bodies, one fixed geom, or actuators, by name.
+
+    Without objects it acts on all contacts, all drives or all signals of the kinds that it knows.
+    """
 
     effect: Effect
     objects: tuple[str, ...]
@@ -35,19 +38,22 @@ class Attached:
         """Whether any rollout of (B, q) numbers has an amplitude that is not zero."""
         return bool(numbers[:, self.amplitudes].any())
 
-    def check(self, model: mujoco.MjModel) -> None:
-        """Raise ConfigError where a model lacks what the effect acts on."""
+    def objection(self, places: Places) -> str:
+        """Why it cannot act in a scene, in one line; empty where it can."""
         kind = self.effect
-        count = {"objects": "at least one object", "walls": "one wall", "cell": "no object"}[kind.on]
-        right = {"objects": len(self.objects) > 0, "walls": len(self.objects) == 1, "cell": not self.objects}[kind.on]
-        if not right:
-            raise ConfigError(f"effect '{kind.name}' acts on {count}, found {list(self.objects)}")
-        bodies, joints = _names(model, "body", model.nbody), _names(model, "joint", model.njnt)
-        known = _names(model, "geom", model.ngeom) if kind.on == "walls" else bodies + joints
-        for name in self.objects:
-            if name not in known:
-                raise ConfigError(f"effect '{kind.name}': the scene has no '{name}'{nearest(name, known)}")
+        if kind.moves and not self.objects:
+            return f"effect '{kind.name}' acts on at least one object, found none"
+        if kind.on_walls and len(self.objects) != 1:
+            return f"effect '{kind.name}' acts on one wall, found {list(self.objects)}"
+        if missing := places.missing(self.objects, kind.on):
+            return f"effect '{kind.name}': {missing}"
+        for site in places.sites(self.objects, kind.on):
+            if kind.unable is not None and (why := kind.unable(places.model, site)):
+                return f"effect '{kind.name}' cannot act on '{site.name}': {why}"
+        return ""
 
-
-def _names(model: mujoco.MjModel, kind: str, count: int) -> list[str]:
-    return [getattr(model, kind)(i).name for i in range(count)]
+    def sites(self, places: Places) -> tuple[Site, ...]:
+        """What the objects are in a scene. Raises ConfigError where the effect cannot act on one of them there."""
+        if objection := self.objection(places):
+            raise ConfigError(objection)
+        return places.sites(self.objects, self.effect.on)

@@ -18,6 +18,6 @@ EFFECT = Effect(
     channel="sensing",
     quantities=(Quantity("latency", "s", 0.0, 0.2, 0.005),),
     sentence="a latency of the camera",
+    on=("camera",),
     sensing=_sensing,
-    on="cell",
 )

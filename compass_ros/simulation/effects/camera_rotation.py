@@ -29,6 +29,6 @@ EFFECT = Effect(
     channel="sensing",
     quantities=(Quantity("angle", "rad", -0.1, 0.1, 0.003),),
     sentence="a rotation of the camera",
+    on=("camera",),
     sensing=_sensing,
-    on="cell",
 )

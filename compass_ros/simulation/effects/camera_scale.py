@@ -23,6 +23,6 @@ EFFECT = Effect(
     channel="sensing",
     quantities=(Quantity("scale", "1", -0.1, 0.1, 0.003),),
     sentence="an error of the camera's scale",
+    on=("camera",),
     sensing=_sensing,
-    on="cell",
 )

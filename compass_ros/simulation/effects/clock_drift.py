@@ -6,6 +6,7 @@ observed(t) = true(t (1 + rate)). Source: rate error of a free-running clock.
 from __future__ import annotations
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity, Sample
+from compass_ros.simulation.sites import SIGNALS
 from compass_ros.types import Floats
 
 
@@ -22,7 +23,7 @@ EFFECT = Effect(
     channel="sensing",
     quantities=(Quantity("rate", "1", -0.1, 0.1, 0.005),),
     sentence="a drift of the sensor's clock",
+    on=SIGNALS,
     sensing=_sensing,
     ahead=_ahead,
-    on="cell",
 )

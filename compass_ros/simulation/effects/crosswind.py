@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.simulation.sites import PLANAR
 from compass_ros.types import Floats
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    return tuple(Term(Kind.CROSSWIND, name, numbers) for name in context.objects)
+    return tuple(Term(Kind.CROSSWIND, site, numbers) for site in context.sites)
 
 
 EFFECT = Effect(
@@ -25,6 +26,7 @@ EFFECT = Effect(
         Quantity("speed", "m/s", 0.3, 10.0, 1.0, amplitude=False, start=1.5),
     ),
     sentence="a steady stream of air across the table",
+    on=PLANAR,
     forces=_forces,
     superposes=False,
     limit="table_tilt",

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
 
 import mujoco
+import numpy as np
 
 from compass_ros.cells.dynamics import Sliding
 from compass_ros.errors import ConfigError
-from compass_ros.simulation.native.program import Term
+from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.simulation.sites import JOINTS, MOVING, Places, Site, SiteKind
+from compass_ros.simulation.sizes import DriveSize, JointSize
 from compass_ros.types import Channel, Floats
 
 Sample = Callable[[Floats], Floats]
 """(B, F) times [s] -> (B, F, C) observed columns; what a perfect sensor would say at those times."""
+_CREEP = 1e-3
+"""Speed at which the friction of a body that lies on something is faded in, where the cell does not say [m/s]."""
 
 
 @dataclass(frozen=True)
@@ -35,19 +39,23 @@ class Quantity:
     most: float = math.inf
     """From here on an effect is no longer what its name says (a patch as wide as the table), and is not named; for
     shapes."""
+    width: bool = False
+    """Whether it is how wide a field is, which at its least is no field any more."""
 
 
 @dataclass(frozen=True)
 class Context:
     """What the cell knows of itself, for hooks. Columns: of an observation; pairs (x, y) in the plane."""
 
-    objects: tuple[str, ...]
-    """Bodies or joints that the effect acts on."""
+    sites: tuple[Site, ...]
+    """What the effect acts on; drives one at a time."""
     sliding: Mapping[str, Sliding]
     planes: tuple[tuple[int, int], ...]
     positions: tuple[int, ...]
-    """Columns that are positions (or joint positions), in metres or radians."""
+    """Columns that are positions of bodies [m]."""
     time_step: float
+    before: Floats | None = None
+    """(B, n) what a drive of n components was told before the first command; None: zeros."""
 
 
 @dataclass(frozen=True)
@@ -59,23 +67,52 @@ class Effect:
     quantities: tuple[Quantity, ...]
     sentence: str
     """What the simulator lacks, as in 'the simulator lacks ...'."""
+    on: tuple[SiteKind, ...]
+    """The kinds of site on which it can act."""
     forces: Callable[[Floats, Context], tuple[Term, ...]] | None = None
     model: Callable[[mujoco.MjModel, Floats, Context], None] | None = None
     """Changes one model, given (q,) numbers; what it changes must be among RESTORED."""
     controls: Callable[[Floats, Floats, Context], Floats] | None = None
-    """(B, T, nu) velocity commands -> the same as the arm follows them."""
+    """(B, T, n) commands of one drive -> the same as it follows them."""
     sensing: Callable[[Sample, Floats, Context], Sample] | None = None
     ahead: Callable[[Floats, float], float] | None = None
     """(B, q) numbers, last time asked for [s] -> how far beyond it the sensor looks [s]; None: not at all."""
     superposes: bool = True
     """Whether small amplitudes add up; False: each direction of the amplitudes is a case of its own."""
-    on: Literal["objects", "walls", "cell"] = "objects"
-    """What it acts on: `objects` (all that are tracked, or some), `walls` (one fixed geom of the scene), `cell`."""
     scattered: bool = False
     """Whether its number is another one in each episode, by chance around zero: a rollout may be given its own as an
     input beside the cell's (`Simulator.inputs`), and what a fit finds is the standard deviation."""
     limit: str = ""
     """Name of the simpler effect that it comes to at an end of its shapes' ranges; empty: none."""
+    on_joint: Callable[[JointSize], tuple[Quantity, ...]] | None = None
+    """Its quantities on a joint, from how that moves and what moves it; None: it acts on no joint."""
+    on_drive: Callable[[DriveSize], tuple[Quantity, ...]] | None = None
+    """Its quantities on a drive that moves no tool along x and y, from what that is told; None: `quantities`."""
+    unable: Callable[[mujoco.MjModel, Site], str] | None = None
+    """Why it cannot act on a site of the right kind, where its kind does not say all; empty: it can. None: it can."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether it acts on bodies or joints by name."""
+        return any(kind in MOVING for kind in self.on)
+
+    @property
+    def on_walls(self) -> bool:
+        """Whether it acts on one fixed geom."""
+        return "wall" in self.on
+
+    def takes(self, model: mujoco.MjModel, site: Site) -> bool:
+        """Whether it can act on a site."""
+        return site.kind in self.on and not (self.unable is not None and self.unable(model, site))
+
+    def at(self, size: JointSize | DriveSize) -> Effect:
+        """The same with the quantities that it has on such a joint or drive, and on its kind alone."""
+        quantities = self.quantities
+        if isinstance(size, JointSize) and self.on_joint is not None:
+            quantities = self.on_joint(size)
+        if isinstance(size, DriveSize) and self.on_drive is not None:
+            quantities = self.on_drive(size)
+        return replace(self, on=(size.kind,), quantities=quantities)
 
 
 RESTORED = (
@@ -98,12 +135,30 @@ def restore(model: mujoco.MjModel, scene: mujoco.MjModel) -> None:
         getattr(model, name)[:] = getattr(scene, name)
 
 
-def creep_and_load(context: Context, name: str) -> tuple[Floats, Floats]:
-    """The two columns that friction on the table needs: creep speed [m/s] and share of the weight on the table.
+def table_friction(sliding: Sliding, places: Places) -> Term:
+    """The friction of a body with its table. Raises ConfigError where the scene has no such body that moves."""
+    site = places.body(sliding.body)
+    if site is None:
+        raise ConfigError(f"the scene has no moving body '{sliding.body}' that could slide on a table")
+    return Term(Kind.TABLE_FRICTION, site, np.stack([sliding.friction, sliding.creep, sliding.load], axis=1))
 
-    Raises ConfigError where the object does not lie on the table.
+
+def told_before(controls: Floats, context: Context) -> Floats:
+    """(B, n) what a drive was told before the first of its (B, T, n) commands."""
+    return np.zeros_like(controls[:, 0]) if context.before is None else context.before.copy()
+
+
+def friction(kind: Kind, context: Context, before: Floats, after: Floats | None = None) -> tuple[Term, ...]:
+    """Terms of a friction on each site: numbers before and after the creep speed and the share of the weight.
+
+    Of a body on a table both are the cell's. A body that the cell says nothing of lies with all its weight, and its
+    friction is faded in at 1 mm/s. Of a joint the first number is a force; fields.c fades it in over what that
+    force would stop within a step, the least that a finite step can do without a jerk.
     """
-    if name not in context.sliding:
-        raise ConfigError(f"friction on the table cannot act on '{name}'; on the table lie {sorted(context.sliding)}")
-    sliding = context.sliding[name]
-    return sliding.creep[:, None], sliding.load[:, None]
+    terms = []
+    for site in context.sites:
+        known = context.sliding.get(site.name) if site.kind == "table" else None
+        creep = known.creep[:, None] if known else np.full((len(before), 1), 0.0 if site.kind in JOINTS else _CREEP)
+        load = known.load[:, None] if known else np.ones((len(before), 1))
+        terms.append(Term(kind, site, np.hstack([before, creep, load, *([] if after is None else [after])])))
+    return tuple(terms)

@@ -15,7 +15,10 @@ from compass_ros.cells.dynamics import Sliding
 from compass_ros.config import read_yaml
 from compass_ros.errors import ConfigError, shown
 from compass_ros.simulation.effects.attached import Attached
+from compass_ros.simulation.effects.effect import Effect
 from compass_ros.simulation.effects.registry import effect
+from compass_ros.simulation.sites import JOINTS, SiteKind
+from compass_ros.simulation.sizes import COMMAND_UNITS, DriveSize, unit_joint
 
 _strict = ConfigDict(extra="forbid", allow_inf_nan=False)
 
@@ -51,6 +54,8 @@ class _Entry:
     name: str
     objects: tuple[str, ...]
     values: Mapping[str, _Value]
+    on: SiteKind | None = None
+    """What kind of site the objects are, where that decides what the numbers mean; None: what the scene says."""
 
 
 @validated(frozen=True, config=_strict, kw_only=True)
@@ -76,6 +81,9 @@ def write_effects(effects: Sequence[FittedEffect], sliding: Mapping[str, Sliding
         },
     )
     content = TypeAdapter(_File).dump_python(file, mode="json")
+    for entry in content["effects"]:
+        if entry["on"] is None:
+            del entry["on"]
     path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
 
 
@@ -86,6 +94,7 @@ def _entry(fitted: FittedEffect) -> _Entry:
         name=kind.name,
         objects=fitted.attached.objects,
         values={q.name: _Value(value=v, unit=q.unit, std=s if np.isfinite(s) else None) for q, v, s in rows},
+        on=kind.on[0] if len(kind.on) == 1 and kind.on != effect(kind.name).on else None,
     )
 
 
@@ -105,11 +114,23 @@ def read_effects(path: Path | str) -> Exported:
 
 
 def _fitted(entry: _Entry, path: Path | str) -> FittedEffect:
-    kind = effect(entry.name)
-    expected = {q.name: q.unit for q in kind.quantities}
     found = {name: value.unit for name, value in entry.values.items()}
+    variants = [(kind, {q.name: q.unit for q in kind.quantities}) for kind in _variants(entry, path)]
+    kind, expected = next((v for v in variants if v[1] == found), variants[0])
     if found != expected:
         raise ConfigError(f"{path}: {entry.name}: expected values with units {expected}, found {shown(found)}")
     given = [entry.values[q.name] for q in kind.quantities]
     std = tuple(float("nan") if v.std is None else v.std for v in given)
     return FittedEffect(Attached(kind, entry.objects), tuple(v.value for v in given), std)
+
+
+def _variants(entry: _Entry, path: Path | str) -> list[Effect]:
+    """The effect as it can be on the kind of site that an entry speaks of: units depend on that."""
+    kind = effect(entry.name)
+    if entry.on is None:
+        return [kind]
+    if entry.on not in kind.on:
+        raise ConfigError(f"{path}: {entry.name}: on: expected one of {', '.join(kind.on)}, found '{entry.on}'")
+    if entry.on in JOINTS:
+        return [kind.at(unit_joint(entry.on))]
+    return [kind.at(DriveSize(entry.on, 1.0, unit)) for unit in COMMAND_UNITS]

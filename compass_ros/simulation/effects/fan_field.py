@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.simulation.sites import PLANAR
 from compass_ros.types import Floats
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    return tuple(Term(Kind.FAN, name, numbers) for name in context.objects)
+    return tuple(Term(Kind.FAN, site, numbers) for site in context.sites)
 
 
 EFFECT = Effect(
@@ -23,9 +24,10 @@ EFFECT = Effect(
         Quantity("strength", "m/s^2", 0.0, 3.0, 0.05),
         Quantity("centre_x", "m", -0.45, 0.45, 0.05, amplitude=False, start=0.0),
         Quantity("centre_y", "m", -0.225, 0.225, 0.05, amplitude=False, start=0.0),
-        Quantity("radius", "m", 0.03, 0.4, 0.03, amplitude=False, start=0.12),
+        Quantity("radius", "m", 0.03, 0.4, 0.03, amplitude=False, start=0.12, width=True),
         Quantity("tail", "1", 0.0, 1.2, 0.3, amplitude=False, start=0.5),
     ),
     sentence="an outward push",
+    on=PLANAR,
     forces=_forces,
 )

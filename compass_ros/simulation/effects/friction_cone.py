@@ -21,6 +21,6 @@ EFFECT = Effect(
     channel="contact",
     quantities=(Quantity("other", "1", 0.0, 1.0, 1.0),),
     sentence="the other friction cone in contacts",
+    on=("contacts",),
     model=_model,
-    on="cell",
 )

@@ -6,19 +6,13 @@ Source: first order of a coefficient that depends on the place.
 
 from __future__ import annotations
 
-import numpy as np
-
-from compass_ros.simulation.effects.effect import Context, Effect, Quantity, creep_and_load
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity, friction
 from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.types import Floats
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    terms = []
-    for name in context.objects:
-        creep, load = creep_and_load(context, name)
-        terms.append(Term(Kind.FRICTION_GRADIENT, name, np.hstack([numbers, creep, load])))
-    return tuple(terms)
+    return friction(Kind.FRICTION_GRADIENT, context, numbers)
 
 
 EFFECT = Effect(
@@ -29,5 +23,6 @@ EFFECT = Effect(
         Quantity("along_y", "1/m", -0.6, 0.6, 0.04),
     ),
     sentence="friction that changes along the table",
+    on=("table",),
     forces=_forces,
 )

@@ -8,19 +8,13 @@ is on a table of 0.45 m: friction changes at a line then, or along the table.
 
 from __future__ import annotations
 
-import numpy as np
-
-from compass_ros.simulation.effects.effect import Context, Effect, Quantity, creep_and_load
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity, friction
 from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.types import Floats
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    terms = []
-    for name in context.objects:
-        creep, load = creep_and_load(context, name)
-        terms.append(Term(Kind.FRICTION_PATCH, name, np.hstack([numbers, creep, load])))
-    return tuple(terms)
+    return friction(Kind.FRICTION_PATCH, context, numbers)
 
 
 EFFECT = Effect(
@@ -30,8 +24,9 @@ EFFECT = Effect(
         Quantity("extra", "1", -0.15, 0.6, 0.02),
         Quantity("centre_x", "m", -0.45, 0.45, 0.05, amplitude=False, start=0.0),
         Quantity("centre_y", "m", -0.225, 0.225, 0.05, amplitude=False, start=0.0),
-        Quantity("radius", "m", 0.03, 0.3, 0.03, amplitude=False, start=0.1, most=0.2),
+        Quantity("radius", "m", 0.03, 0.3, 0.03, amplitude=False, start=0.1, most=0.2, width=True),
     ),
     sentence="a patch with other friction",
+    on=("table",),
     forces=_forces,
 )

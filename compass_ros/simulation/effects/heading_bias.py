@@ -1,6 +1,6 @@
 """An arm that pushes beside the commanded direction.
 
-u is turned by `angle`, anticlockwise. Source: misaligned tool or base frame.
+u is turned by `angle` about z, anticlockwise. Source: misaligned tool or base frame.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from compass_ros.types import Floats
 def _controls(controls: Floats, numbers: Floats, context: Context) -> Floats:
     cos, sin = np.cos(numbers[:, :1]), np.sin(numbers[:, :1])
     x, y = controls[:, :, 0], controls[:, :, 1]
-    return np.stack([cos * x - sin * y, sin * x + cos * y], axis=2)
+    return np.concatenate([np.stack([cos * x - sin * y, sin * x + cos * y], axis=2), controls[:, :, 2:]], axis=2)
 
 
 EFFECT = Effect(
@@ -22,6 +22,6 @@ EFFECT = Effect(
     channel="actuation",
     quantities=(Quantity("angle", "rad", -0.2, 0.2, 0.005),),
     sentence="a bias of the pushing direction",
+    on=("tool_drive",),
     controls=_controls,
-    on="cell",
 )

@@ -26,6 +26,6 @@ EFFECT = Effect(
     channel="sensing",
     quantities=(Quantity("k1", "1/m^2", -0.4, 0.4, 0.02),),
     sentence="a distortion of the lens",
+    on=("camera",),
     sensing=_sensing,
-    on="cell",
 )

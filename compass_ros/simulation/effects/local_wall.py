@@ -15,7 +15,7 @@ from compass_ros.types import Floats
 
 def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
     offset, softness = numbers
-    geom = model.geom(context.objects[0]).id
+    geom = model.geom(context.sites[0].name).id
     axes = np.zeros(9)
     mujoco.mju_quat2Mat(axes, model.geom_quat[geom])
     plane = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
@@ -31,6 +31,6 @@ EFFECT = Effect(
     channel="contact",
     quantities=(Quantity("offset", "m", -0.03, 0.03, 0.002), Quantity("softness", "1", -2.5, 1.0, 0.2)),
     sentence="that one wall stands elsewhere or is softer",
+    on=("wall",),
     model=_model,
-    on="walls",
 )

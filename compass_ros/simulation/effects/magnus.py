@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.simulation.sites import PLANAR
 from compass_ros.types import Floats
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    return tuple(Term(Kind.MAGNUS, name, numbers) for name in context.objects)
+    return tuple(Term(Kind.MAGNUS, site, numbers) for site in context.sites)
 
 
 EFFECT = Effect(
@@ -20,5 +21,6 @@ EFFECT = Effect(
     channel="dynamics",
     quantities=(Quantity("rate", "1/s", -2.0, 2.0, 0.05),),
     sentence="a push across the motion (Magnus force)",
+    on=PLANAR,
     forces=_forces,
 )

@@ -10,25 +10,24 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from compass_ros.errors import ConfigError
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.simulation.sites import PLANAR, Site
 from compass_ros.types import Floats
 
 
 def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
     shift = np.array([*numbers[:2], 0.0])
-    for name in context.objects:
-        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-        if body < 0:
-            raise ConfigError(f"off_centre_mass acts on bodies, '{name}' is a joint")
-        if model.body_simple[body] and shift.any():
-            raise ConfigError(
-                f"off_centre_mass cannot act on '{name}': MuJoCo has compiled it as centred for good; "
-                "give it an <inertial> some micrometres off the centre"
-            )
+    for site in context.sites:
+        body = model.body(site.name).id
         model.body_ipos[body] += shift
         model.body_inertia[body] += model.body_mass[body] * numbers[2] * _across(shift, model.body_iquat[body])
         model.body_sameframe[body] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
+
+
+def _unable(model: mujoco.MjModel, site: Site) -> str:
+    if not model.body_simple[model.body(site.name).id]:
+        return ""
+    return "MuJoCo has compiled it as centred for good; give it an <inertial> some micrometres off the centre"
 
 
 def _across(shift: Floats, frame: Floats) -> Floats:
@@ -49,5 +48,7 @@ EFFECT = Effect(
         Quantity("arm", "m", 0.0, 0.05, 0.01, amplitude=False, start=0.01),
     ),
     sentence="a centre of mass beside the centre",
+    on=PLANAR,
     model=_model,
+    unable=_unable,
 )

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.simulation.sites import PLANAR
 from compass_ros.types import Floats
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    return tuple(Term(Kind.ATTRACTION, name, numbers) for name in context.objects)
+    return tuple(Term(Kind.ATTRACTION, site, numbers) for site in context.sites)
 
 
 EFFECT = Effect(
@@ -22,8 +23,9 @@ EFFECT = Effect(
         Quantity("strength", "m/s^2", 0.0, 3.0, 0.05),
         Quantity("centre_x", "m", -0.45, 0.45, 0.05, amplitude=False, start=0.0),
         Quantity("centre_y", "m", -0.225, 0.225, 0.05, amplitude=False, start=0.0),
-        Quantity("core", "m", 0.02, 0.3, 0.03, amplitude=False, start=0.08),
+        Quantity("core", "m", 0.02, 0.3, 0.03, amplitude=False, start=0.08, width=True),
     ),
     sentence="a pull towards a point",
+    on=PLANAR,
     forces=_forces,
 )

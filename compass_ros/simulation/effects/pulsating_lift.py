@@ -6,19 +6,13 @@ Source: Coulomb friction under a load that oscillates; only a phase that is the 
 
 from __future__ import annotations
 
-import numpy as np
-
-from compass_ros.simulation.effects.effect import Context, Effect, Quantity, creep_and_load
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity, friction
 from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.types import Floats
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    terms = []
-    for name in context.objects:
-        creep, load = creep_and_load(context, name)
-        terms.append(Term(Kind.PULSATING, name, np.hstack([numbers[:, :2], creep, load, numbers[:, 2:]])))
-    return tuple(terms)
+    return friction(Kind.PULSATING, context, numbers[:, :2], numbers[:, 2:])
 
 
 EFFECT = Effect(
@@ -30,5 +24,6 @@ EFFECT = Effect(
         Quantity("frequency", "Hz", 0.2, 6.0, 0.3, amplitude=False, start=1.0),
     ),
     sentence="a pulsation of the lift",
+    on=("table",),
     forces=_forces,
 )

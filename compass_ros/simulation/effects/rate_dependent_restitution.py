@@ -12,7 +12,7 @@ from compass_ros.types import Floats
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    return (Term(Kind.RATE_RESTITUTION, "", numbers),)
+    return (Term(Kind.RATE_RESTITUTION, None, numbers),)
 
 
 EFFECT = Effect(
@@ -20,6 +20,6 @@ EFFECT = Effect(
     channel="contact",
     quantities=(Quantity("slope", "s/m", -0.8, 20.0, 0.5),),
     sentence="a restitution that depends on the speed of impact",
+    on=("contacts",),
     forces=_forces,
-    on="cell",
 )

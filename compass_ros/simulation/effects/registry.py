@@ -12,11 +12,11 @@ from compass_ros.simulation.effects.effect import Effect
 _NAMES = (
     *("table_tilt", "viscous_drag", "quadratic_drag", "crosswind", "fan_field", "swirl", "point_attraction"),
     *("friction_patch", "friction_gradient", "anisotropic_friction", "stribeck_friction", "coulomb_friction"),
-    *("magnus", "pulsating_lift"),
+    *("magnus", "pulsating_lift", "spring"),
     *("rate_dependent_restitution", "tangential_impulse", "local_wall", "off_centre_mass", "friction_cone"),
     *("actuation_delay", "first_order_lag", "velocity_saturation", "dead_band", "heading_bias", "stroke_jitter"),
     *("camera_latency", "camera_scale", "camera_rotation", "lens_distortion", "rolling_shutter", "tracking_lag"),
-    "clock_drift",
+    *("clock_drift", "latency"),
 )
 EFFECTS: Mapping[str, Effect] = MappingProxyType(
     {name: import_module(f"compass_ros.simulation.effects.{name}").EFFECT for name in _NAMES}

@@ -34,7 +34,7 @@ EFFECT = Effect(
     channel="sensing",
     quantities=(Quantity("time", "s", -0.05, 0.05, 0.003),),
     sentence="a rolling shutter",
+    on=("camera",),
     sensing=_sensing,
     ahead=_ahead,
-    on="cell",
 )

@@ -7,22 +7,24 @@ Source: Stribeck curve in the form of Armstrong-Helouvry 1994, Gaussian exponent
 
 from __future__ import annotations
 
-import numpy as np
-
-from compass_ros.simulation.effects.effect import Context, Effect, Quantity, creep_and_load
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity, friction
 from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.simulation.sites import JOINTS, LYING
+from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize
 from compass_ros.types import Floats
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    terms = []
-    for name in context.objects:
-        if name in context.sliding:
-            creep, load = creep_and_load(context, name)
-        else:  # a joint, or a body off the table: the friction is a torque [N m], faded in at 1 mrad/s (1 mm/s)
-            creep, load = np.full((len(numbers), 1), 1e-3), np.ones((len(numbers), 1))
-        terms.append(Term(Kind.STRIBECK, name, np.hstack([numbers[:, :1], creep, load, numbers[:, 1:]])))
-    return tuple(terms)
+    return friction(Kind.STRIBECK, context, numbers[:, :1], numbers[:, 1:])
+
+
+def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
+    """At a speed beyond the fastest that was seen the friction would hardly fall: it is dry friction then."""
+    v = size.fastest
+    return (
+        Quantity("extra", size.force_unit, 0.0, LARGEST * size.force, MODEST * size.force),
+        Quantity("speed", f"{size.length_unit}/s", 0.01 * v, 3.0 * v, 0.1 * v, amplitude=False, start=0.2 * v, most=v),
+    )
 
 
 EFFECT = Effect(
@@ -33,5 +35,7 @@ EFFECT = Effect(
         Quantity("speed", "m/s", 0.01, 1.0, 0.05, amplitude=False, start=0.1, most=0.3),
     ),
     sentence="higher friction at low speed (Stribeck)",
+    on=(*LYING, *JOINTS),
     forces=_forces,
+    on_joint=_on_joint,
 )

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.simulation.sites import SPEED_DRIVES
 from compass_ros.types import Floats
 
 
@@ -21,7 +22,7 @@ EFFECT = Effect(
     channel="actuation",
     quantities=(Quantity("deviation", "1", -0.3, 0.3, 0.01),),
     sentence="a scatter of the pushing speed",
+    on=(*SPEED_DRIVES, "effort_drive"),
     controls=_controls,
-    on="cell",
     scattered=True,
 )

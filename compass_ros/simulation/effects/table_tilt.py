@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.simulation.sites import LYING
 from compass_ros.types import Floats
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    return tuple(Term(Kind.TILT, name, numbers) for name in context.objects)
+    return tuple(Term(Kind.TILT, site, numbers) for site in context.sites)
 
 
 EFFECT = Effect(
@@ -23,5 +24,6 @@ EFFECT = Effect(
         Quantity("tilt_y", "rad", -0.05, 0.05, 0.003),
     ),
     sentence="a tilt of the table",
+    on=LYING,
     forces=_forces,
 )

@@ -16,7 +16,7 @@ _CREEP = 0.01  # m/s
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    return (Term(Kind.TANGENTIAL, "", np.hstack([numbers, np.full_like(numbers, _CREEP)])),)
+    return (Term(Kind.TANGENTIAL, None, np.hstack([numbers, np.full_like(numbers, _CREEP)])),)
 
 
 EFFECT = Effect(
@@ -24,6 +24,6 @@ EFFECT = Effect(
     channel="contact",
     quantities=(Quantity("friction", "1", 0.0, 0.8, 0.03),),
     sentence="friction between the rims in contacts",
+    on=("contacts",),
     forces=_forces,
-    on="cell",
 )

@@ -46,7 +46,7 @@ EFFECT = Effect(
         Quantity("spread", "1", 0.25, 1.0, 0.2, amplitude=False, start=0.7),
     ),
     sentence="a lag of the tracker",
+    on=("camera",),
     sensing=_sensing,
-    on="cell",
     limit="camera_latency",
 )

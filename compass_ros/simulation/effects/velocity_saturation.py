@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.simulation.sites import SPEED_DRIVES
+from compass_ros.simulation.sizes import DriveSize
 from compass_ros.types import Floats
 
 
@@ -16,6 +18,15 @@ def _controls(controls: Floats, numbers: Floats, context: Context) -> Floats:
     speed, sharpness = np.linalg.norm(controls, axis=2), numbers[:, 1:]
     ratio = speed * numbers[:, :1]
     return np.asarray(controls / ((1 + ratio**sharpness) ** (1 / sharpness))[:, :, None])
+
+
+def _on_drive(size: DriveSize) -> tuple[Quantity, ...]:
+    """The shares of the largest command that are asked of a tool pushed at 0.5 m/s."""
+    per = size.unit.split("/")[0]
+    return (
+        Quantity("inverse_limit", f"s/{per}" if per != "1" else "1", 0.0, 5.0 / size.command, 0.15 / size.command),
+        Quantity("sharpness", "1", 2.0, 60.0, 4.0, amplitude=False, start=8.0),
+    )
 
 
 EFFECT = Effect(
@@ -26,6 +37,7 @@ EFFECT = Effect(
         Quantity("sharpness", "1", 2.0, 60.0, 4.0, amplitude=False, start=8.0),
     ),
     sentence="a limit of the arm's speed",
+    on=SPEED_DRIVES,
     controls=_controls,
-    on="cell",
+    on_drive=_on_drive,
 )

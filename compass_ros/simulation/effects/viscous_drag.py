@@ -1,17 +1,25 @@
 """Drag that grows with speed.
 
-F = -m rate v. Source: Stokes drag and viscous shear of the air cushion, both linear in the speed.
+F = -m rate v; on a joint F = -rate v, a torque (a force on a slide).
+Source: Stokes drag and viscous shear of an air cushion, of grease in a bearing; all linear in the speed.
 """
 
 from __future__ import annotations
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.simulation.sites import MOVING
+from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize
 from compass_ros.types import Floats
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    return tuple(Term(Kind.VISCOUS, name, numbers) for name in context.objects)
+    return tuple(Term(Kind.VISCOUS, site, numbers) for site in context.sites)
+
+
+def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
+    most = size.force / size.speed
+    return (Quantity("rate", size.unit(" s/L"), 0.0, LARGEST * most, MODEST * most),)
 
 
 EFFECT = Effect(
@@ -19,5 +27,7 @@ EFFECT = Effect(
     channel="dynamics",
     quantities=(Quantity("rate", "1/s", 0.0, 3.0, 0.05),),
     sentence="a drag proportional to speed",
+    on=MOVING,
     forces=_forces,
+    on_joint=_on_joint,
 )

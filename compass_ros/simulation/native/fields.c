@@ -18,7 +18,7 @@ enum { N_NUMBERS = 8, TABLE = 1 << 16 };
 enum Kind {
   TABLE_FRICTION = 1, UNIFORM = 2, VISCOUS = 3, QUADRATIC = 4, CROSSWIND = 5, FAN = 6, SWIRL = 7, ATTRACTION = 8,
   FRICTION_PATCH = 9, FRICTION_GRADIENT = 10, ANISOTROPIC = 11, STRIBECK = 12, COULOMB = 13, MAGNUS = 14, PULSATING = 15,
-  RATE_RESTITUTION = 16, TANGENTIAL = 17, LIBRARY = 18, HAT = 19, TILT = 20,
+  RATE_RESTITUTION = 16, TANGENTIAL = 17, LIBRARY = 18, HAT = 19, TILT = 20, SPRING = 21,
 };
 
 // What the object is, and so where its forces go: a body that slides along x and y, the same with a hinge about z after
@@ -85,16 +85,20 @@ void compass_forget(const mjModel* model) {
 // --- forces on one object -----------------------------------------------------------------------------------------------
 
 // What a force may depend on: position [m] and velocity [m/s] in the world (JOINT: angle and rate in [0]), inertia.
+// Numbers of a joint are forces and torques themselves: its mass is 1 and it has no weight. `give` is the speed that a
+// unit force takes from it within a step [m/s per N]; 0 for bodies.
 typedef struct {
-  double x, y, vx, vy, vz, speed, mass, weight, time;
+  double x, y, vx, vy, vz, speed, mass, weight, time, give;
 } State;
 
 typedef struct {
   double x, y, z;
 } Force;
 
-static Force along(const State* s, double magnitude, double creep) {   // against the velocity, smooth through zero
-  double k = -magnitude / sqrt(s->speed * s->speed + creep * creep);
+// Against the velocity, smooth through zero: over the creep speed, and over what the force itself stops within a step.
+static Force along(const State* s, double magnitude, double creep) {
+  double stopped = magnitude * s->give, rate = sqrt(s->speed * s->speed + creep * creep + stopped * stopped);
+  double k = rate > 0 ? -magnitude / rate : 0;
   return (Force){k * s->vx, k * s->vy, k * s->vz};
 }
 
@@ -109,7 +113,7 @@ static Force evaluate(const Term* term, const State* s) {
   switch (term->kind) {
     case TABLE_FRICTION:   // p: friction, creep speed, share of the weight that the table carries
       return along(s, p[0] * s->weight * p[2], p[1]);
-    case COULOMB:          // p: friction (JOINT: torque), creep speed, share of the weight
+    case COULOMB:          // p: friction (JOINT: force), creep speed, share of the weight
       return along(s, term->object == JOINT ? p[0] : p[0] * s->weight * p[2], p[1]);
     case STRIBECK:         // p: extra friction at rest, creep speed, share of the weight, Stribeck speed
       return along(s, p[0] * (term->object == JOINT ? 1.0 : s->weight * p[2]) * exp(-s->speed * s->speed / (p[3] * p[3])),
@@ -158,10 +162,12 @@ static Force evaluate(const Term* term, const State* s) {
     case LIBRARY: {        // p: coefficient, powers of x, y, vx, vy, speed; component (0 x, 1 y, 2 against the velocity)
       double value = s->mass * p[0] * pow(s->x, p[1]) * pow(s->y, p[2]) * pow(s->vx, p[3]) * pow(s->vy, p[4]) *
                      pow(s->speed, p[5]);
-      if (p[6] == 2) return along(s, value, 1e-3);
+      if (p[6] == 2) return along(s, value, term->object == JOINT ? 0 : 1e-3);
       return p[6] == 0 ? (Force){value, 0, 0} : (Force){0, value, 0};
     }
-    case HAT: {            // p: acceleration x, y, time of the peak, half-width in time
+    case SPRING:           // p: stiffness, rest
+      return (Force){-s->mass * p[0] * (s->x - p[1]), 0, 0};
+    case HAT: {            // p: acceleration x, y (JOINT: force), time of the peak, half-width in time
       double k = s->mass * fmax(0, 1 - fabs(s->time - p[2]) / p[3]);
       return (Force){k * p[0], k * p[1], 0};
     }
@@ -170,13 +176,15 @@ static Force evaluate(const Term* term, const State* s) {
   }
 }
 
-// The forces of n terms in n states, six numbers each (x, y, vx, vy, mass, time), for bodies on a table; (n, 2) out.
+// The forces of n terms in n states, six numbers each (x, y, vx, vy, mass, time), on bodies in the plane or on joints;
+// (n, 2) out.
 void compass_evaluate(int64_t n, const Term* term, const double* state, double gravity, double* out) {
   for (int64_t i = 0; i < n; i++) {
     const double* row = state + 6 * i;
     State s = {.x = row[0], .y = row[1], .vx = row[2], .vy = row[3], .mass = row[4], .time = row[5]};
     s.speed = sqrt(s.vx * s.vx + s.vy * s.vy);
     s.weight = s.mass * gravity;
+    if (term[i].object == JOINT) s.mass = 1, s.weight = 0;
     Force f = evaluate(term + i, &s);
     out[2 * i] = f.x;
     out[2 * i + 1] = f.y;
@@ -201,7 +209,8 @@ static void push(const mjModel* m, mjData* d, const Term* term) {
   if (term->object == JOINT) {
     s.x = d->qpos[m->jnt_qposadr[term->id]];
     s.vx = v[0];
-    s.mass = 1;             // coefficients of joints are per unit of nothing: torque [N m] directly
+    s.mass = 1;
+    s.give = m->opt.timestep / d->qM[m->dof_Madr[term->dof]];
   } else {
     s.x = com[0];
     s.y = com[1];

@@ -12,7 +12,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from compass_ros.errors import ConfigError, nearest
+from compass_ros.errors import ConfigError
+from compass_ros.simulation.sites import JOINTS, PLANAR, Site
 from compass_ros.types import Floats
 
 NUMBERS = 8
@@ -43,6 +44,7 @@ class Kind(IntEnum):
     LIBRARY = 18
     HAT = 19
     TILT = 20
+    SPRING = 21
 
 
 class Placement(IntEnum):
@@ -59,8 +61,8 @@ class Term:
     """One kind of force on one object (contact kinds: on all contacts), with numbers for each rollout of a batch."""
 
     kind: Kind
-    object: str
-    """Name of the body or joint in the scene; empty for contact kinds."""
+    site: Site | None
+    """The body or joint in the scene; None for contact kinds."""
     numbers: Floats
     """(B, up to NUMBERS) in the order that fields.c documents for the kind."""
 
@@ -68,8 +70,7 @@ class Term:
 class Programs:
     """The programs of a batch of models that are alike, registered while the context is open.
 
-    Keeps the memory that C reads alive. Raises ConfigError where an object of a term is no moving body or joint of the
-    models, or where a model has a program already.
+    Keeps the memory that C reads alive. Raises ConfigError where a model has a program already.
     """
 
     def __init__(self, models: Sequence[mujoco.MjModel], terms: Sequence[Term]) -> None:
@@ -78,8 +79,8 @@ class Programs:
         for i, term in enumerate(terms):
             row = self._block[:, i]
             row["kind"] = term.kind
-            if term.object:
-                row["object"], row["id"], row["dof"] = _place(models[0], term.object)
+            if term.site is not None:
+                row["object"], row["id"], row["dof"] = _place(models[0], term.site)
             row["number"][:, : term.numbers.shape[1]] = term.numbers
         self._programs = np.zeros(len(models), _PROGRAM)
         self._programs["n"] = len(terms)
@@ -108,10 +109,14 @@ class Programs:
 
 
 def evaluate(term: Term, states: Floats, gravity: float) -> Floats:
-    """(B, F, 2) planar forces [N] of a term in (B, F, 6) states (x, y, vx, vy, mass, time); the code of a rollout."""
+    """(B, F, 2) forces [N] of a term in (B, F, 6) states (x, y, vx, vy, mass, time); the code of a rollout.
+
+    Of a joint, states are (angle, 0, rate, 0, anything, time) and forces torques, in the first of the two.
+    """
     batch, frames = states.shape[:2]
     rows = np.zeros((batch, frames), _TERM)
     rows["kind"] = term.kind
+    rows["object"] = Placement.JOINT if term.site is not None and term.site.kind in JOINTS else Placement.PLANAR
     rows["number"][:, :, : term.numbers.shape[1]] = term.numbers[:, None]
     given = np.ascontiguousarray(states, dtype=np.float64)
     out = np.zeros((batch, frames, 2))
@@ -126,33 +131,16 @@ def _address(model: mujoco.MjModel | mujoco.MjSpec) -> int:
     return int(model._address)  # noqa: SLF001 - MuJoCo offers it under this name alone
 
 
-def _place(model: mujoco.MjModel, name: str) -> tuple[Placement, int, int]:
-    """How the forces on a body (or joint) of that name reach the degrees of freedom; its id; the first of them."""
-    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
-    if joint >= 0:
+def _place(model: mujoco.MjModel, site: Site) -> tuple[Placement, int, int]:
+    """How the forces on a body or joint reach the degrees of freedom; its id; the first of them."""
+    if site.kind in JOINTS:
+        joint = model.joint(site.name).id
         return Placement.JOINT, joint, int(model.jnt_dofadr[joint])
-    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-    if body < 0 or not model.body_weldid[body]:
-        moving = [model.body(i).name for i in range(1, model.nbody) if model.body_weldid[i]]
-        raise ConfigError(f"the scene has no moving body or joint '{name}'; it moves {moving}{nearest(name, moving)}")
-    return _joints_of(model, body), body, int(model.body_dofadr[body])
-
-
-def _joints_of(model: mujoco.MjModel, body: int) -> Placement:
-    """PLANAR or PLANAR_YAW for a body of the world that slides along x and y; BODY for anything else that moves."""
-    count = int(model.body_jntnum[body])
-    own = slice(model.body_jntadr[body], model.body_jntadr[body] + count)
-    planar = [mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE]
-    if (
-        count in (2, 3)
-        and model.body_parentid[body] == 0
-        and model.jnt_type[own].tolist() == planar[:count]
-        and np.array_equal(model.jnt_axis[own], np.eye(3)[:count])
-        and np.array_equal(model.body_quat[body], [1, 0, 0, 0])
-        and not model.jnt_pos[own].any()
-    ):
-        return Placement.PLANAR if count == 2 else Placement.PLANAR_YAW
-    return Placement.BODY
+    body = model.body(site.name).id
+    placement = Placement.BODY
+    if site.kind in PLANAR:
+        placement = Placement.PLANAR if model.body_jntnum[body] == 2 else Placement.PLANAR_YAW
+    return placement, body, int(model.body_dofadr[body])
 
 
 @cache
@@ -194,28 +182,12 @@ def _library() -> ctypes.PyDLL:
 
 
 def path_columns(
-    model: mujoco.MjModel, name: str
+    model: mujoco.MjModel, site: Site
 ) -> tuple[tuple[int, int, int, int], tuple[float, float, float, float]]:
-    """Where a body on the table (or a joint) is in (qpos, qvel): x, y, vx, vy, -1 for none; and its place at qpos 0."""
-    placement, identity, dof = _place(model, name)
-    if placement is Placement.JOINT:
+    """Where a body in the plane (or a joint) is in (qpos, qvel): x, y, vx, vy, -1 for none; and its place at qpos 0."""
+    _, identity, dof = _place(model, site)
+    if site.kind in JOINTS:
         return (int(model.jnt_qposadr[identity]), -1, model.nq + dof, -1), (0.0, 0.0, 0.0, 0.0)
     position = int(model.jnt_qposadr[model.body_jntadr[identity]])
-    x, y = (float(p) for p in model.body_pos[identity][:2]) if placement is not Placement.BODY else (0.0, 0.0)
+    x, y = (float(p) for p in model.body_pos[identity][:2])
     return (position, position + 1, model.nq + dof, model.nq + dof + 1), (x, y, 0.0, 0.0)
-
-
-def slides_or_turns(model: mujoco.MjModel, name: str) -> bool:
-    """Whether a name is a body that slides in the plane, or a joint."""
-    if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) >= 0:
-        return True
-    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-    return body >= 0 and model.body_jntnum[body] > 0 and _place(model, name)[0] is not Placement.BODY
-
-
-def mover_masses(model: mujoco.MjModel, names: Sequence[str]) -> Floats:
-    """(N,) mass of each mover [kg]; 1 for joints."""
-    joints = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) >= 0 for name in names]
-    return np.array(
-        [1.0 if joint else float(model.body_mass[model.body(n).id]) for n, joint in zip(names, joints, strict=True)]
-    )

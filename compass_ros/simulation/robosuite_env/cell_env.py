@@ -16,8 +16,10 @@ from robosuite.utils.observables import Observable, sensor
 
 from compass_ros.cells import load
 from compass_ros.cells.registry import dynamics_of
-from compass_ros.simulation.native.program import Kind, Programs, Term
+from compass_ros.simulation.effects.effect import table_friction
+from compass_ros.simulation.native.program import Programs
 from compass_ros.simulation.robosuite_env.scene import GRIP, contact_force, mapping, reach, servo, tool_of, with_cell
+from compass_ros.simulation.sites import Places
 from compass_ros.types import Floats
 
 TABLE_HEIGHT = 0.8
@@ -141,7 +143,7 @@ class CellEnv(ManipulationEnv):  # type: ignore[misc]  # robosuite is not annota
         mujoco.mj_setConst(self.native_model, mujoco.MjData(self.native_model))
         self._servo = servo(self._scene, self._tool)
         sliding = self._dynamics.sliding(values[None])
-        terms = [Term(Kind.TABLE_FRICTION, s.body, np.stack([s.friction, s.creep, s.load], axis=1)) for s in sliding]
+        terms = [table_friction(s, Places(self.native_model)) for s in sliding]
         self._forces.close()
         self._forces.enter_context(Programs([self.native_model], terms))
 

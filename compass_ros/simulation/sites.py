@@ -1,0 +1,239 @@
+"""Where physics can act in a scene: its joints, bodies, walls, contacts, drives and signals, each of one kind.
+
+A law says on which kinds it acts, and so what it is asked about follows from what a cell has: no law is tried on a site
+to see whether it fails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import mujoco
+import numpy as np
+
+from compass_ros.errors import nearest
+
+SiteKind = Literal[
+    "hinge",
+    "slide",
+    "table",
+    "lying",
+    "planar",
+    "body",
+    "wall",
+    "contacts",
+    "tool_drive",
+    "velocity_drive",
+    "position_drive",
+    "effort_drive",
+    "other_drive",
+    "camera",
+    "encoder",
+    "sensor",
+]
+"""hinge, slide: a joint with one degree of freedom. planar: a body that slides along x and y of the world (and may turn
+about z); lying: one that gravity presses on what it slides on; table: one whose friction there is the cell's. body: any
+other moving body. wall: a fixed geom in a pair. contacts: all of the scene. velocity_drive, position_drive,
+effort_drive, other_drive: an actuator by what it is told; tool_drive: velocity drives that move one tool along x and y
+of the world (and z), whose command is a vector. camera: all tracked bodies as they are seen; encoder: all that is
+measured of joints; sensor: all other signals."""
+
+JOINTS: tuple[SiteKind, ...] = ("hinge", "slide")
+LYING: tuple[SiteKind, ...] = ("table", "lying")
+PLANAR: tuple[SiteKind, ...] = (*LYING, "planar")
+MOVING: tuple[SiteKind, ...] = (*JOINTS, *PLANAR, "body")
+SPEED_DRIVES: tuple[SiteKind, ...] = ("tool_drive", "velocity_drive")
+DRIVES: tuple[SiteKind, ...] = (*SPEED_DRIVES, "position_drive", "effort_drive", "other_drive")
+SIGNALS: tuple[SiteKind, ...] = ("camera", "encoder", "sensor")
+
+_WORDS: dict[SiteKind, str] = {
+    "table": "body on the cell's table",
+    "lying": "body that lies on a plane",
+    "planar": "body that slides in a plane",
+    "body": "moving body",
+    "wall": "fixed geom in a contact pair",
+    "contacts": "geoms that could touch",
+    "camera": "tracked body",
+    "encoder": "measured joint",
+    "sensor": "other sensor",
+}
+_SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
+ONE_DOF = (_HINGE, _SLIDE)
+OF_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+
+
+@dataclass(frozen=True)
+class Site:
+    """One place where physics can act."""
+
+    kind: SiteKind
+    names: tuple[str, ...] = ()
+    """Of a joint, body or geom, or of a drive's actuators; empty for contacts and signals."""
+    actuators: tuple[int, ...] = ()
+    """Of a drive: indices of its controls, in the order of the command's components."""
+
+    @property
+    def name(self) -> str:
+        """Of a joint, body or geom."""
+        return self.names[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """The sites of a scene."""
+
+    model: mujoco.MjModel
+    sliding: frozenset[str] = frozenset()
+    """Bodies whose friction on a table is the cell's, no part of the scene."""
+    signals: tuple[SiteKind, ...] = ()
+    """What is measured of it."""
+
+    def sites(self, objects: Sequence[str], kinds: Collection[SiteKind]) -> tuple[Site, ...]:
+        """Those of these kinds that the names stand for; without names all drives, all contacts or all signals."""
+        if not objects:
+            whole = [*self.drives, *([Site("contacts")] if self.touching else []), *map(Site, self.signals)]
+            return tuple(site for site in whole if site.kind in kinds)
+        found = [self.of(name, kinds) for name in objects]
+        return self._joined(objects, kinds) or tuple(site for site in found if site is not None)
+
+    def missing(self, objects: Sequence[str], kinds: Collection[SiteKind]) -> str:
+        """Which of the names stands for no site of these kinds, and what there is, in one line; empty: none."""
+        found, wanted = names_of(self.sites(objects, kinds)), in_words(kinds)
+        if not objects:
+            return "" if self.sites((), kinds) else f"the scene has no {wanted}"
+        unknown = next((name for name in objects if name not in found), None)
+        if unknown is None:
+            return ""
+        known = self._names(kinds)
+        return f"the scene has no {wanted} '{unknown}'; it has {known or 'none'}{nearest(unknown, known)}"
+
+    def joint(self, name: str) -> Site | None:
+        """A hinge or slide of that name."""
+        found = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_JOINT, name)
+        kinds: dict[int, SiteKind] = {_HINGE: "hinge", _SLIDE: "slide"}
+        kind = kinds.get(int(self.model.jnt_type[found])) if found >= 0 else None
+        return Site(kind, (name,)) if kind else None
+
+    def body(self, name: str) -> Site | None:
+        """A moving body of that name."""
+        found = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, name)
+        if found < 0 or not self.model.body_weldid[found]:
+            return None
+        if not slides_in_plane(self.model, found):
+            return Site("body", (name,))
+        pressed = self.model.opt.gravity[2] < 0
+        return Site(("table" if name in self.sliding else "lying") if pressed else "planar", (name,))
+
+    def wall(self, name: str) -> Site | None:
+        """A fixed geom of that name that stands in a contact pair."""
+        return Site("wall", (name,)) if name in self.walls else None
+
+    def of(self, name: str, kinds: Collection[SiteKind]) -> Site | None:
+        """The joint, body or wall of one of these kinds that has the name; a joint before a body called the same."""
+        found = (self.joint(name), self.body(name), self.wall(name))
+        return next((site for site in found if site is not None and site.kind in kinds), None)
+
+    def _joined(self, names: Sequence[str], kinds: Collection[SiteKind]) -> tuple[Site, ...]:
+        """The drives of these kinds whose actuators are exactly these; none where the names are no such drives."""
+        wanted = [d for d in self.drives if d.kind in kinds and set(d.names) <= set(names)]
+        return tuple(wanted) if sorted(names_of(wanted)) == sorted(names) else ()
+
+    def _names(self, kinds: Collection[SiteKind]) -> list[str]:
+        """Of all sites of some kinds."""
+        model = self.model
+        joints = [self.joint(model.joint(i).name) for i in range(model.njnt)]
+        bodies = [self.body(model.body(i).name) for i in range(1, model.nbody)]
+        found = [*joints, *bodies, *map(self.wall, self.walls), *self.drives]
+        return list(names_of(site for site in found if site is not None and site.kind in kinds))
+
+    @cached_property
+    def walls(self) -> tuple[str, ...]:
+        """Fixed geoms that stand in a contact pair, by name."""
+        model = self.model
+        pairs = [(model.pair_geom1[i], model.pair_geom2[i]) for i in range(model.npair)]
+        fixed = {int(g) for pair in pairs for g in pair if model.body_weldid[model.geom_bodyid[g]] == 0}
+        return tuple(model.geom(g).name for g in sorted(fixed) if model.geom(g).name)
+
+    @cached_property
+    def drives(self) -> tuple[Site, ...]:
+        """Actuators by what they are told; those that move one tool together."""
+        single = [Site(drive_kind(self.model, i), (self.model.actuator(i).name,), (i,)) for i in range(self.model.nu)]
+        tools = [tool for body in range(1, self.model.nbody) if (tool := self._tool(body, single))]
+        taken = {i for tool in tools for i in tool.actuators}
+        alone = [d for d in single if d.actuators[0] not in taken]
+        return tuple(sorted([*tools, *alone], key=lambda d: min(d.actuators)))
+
+    def _tool(self, body: int, single: Sequence[Site]) -> Site | None:
+        """The velocity drives of a body's slides along x and y of the world, and z where it has one."""
+        model, first = self.model, int(self.model.body_jntadr[body])
+        slides = [j for j in range(first, first + int(model.body_jntnum[body])) if model.jnt_type[j] == _SLIDE]
+        on = {int(model.actuator_trnid[d.actuators[0], 0]): d for d in single
+              if d.kind == "velocity_drive" and model.actuator_trntype[d.actuators[0]] in OF_JOINT}  # fmt: skip
+        upright = model.body_parentid[body] == 0 and np.array_equal(model.body_quat[body], [1, 0, 0, 0])
+        along = len(slides) in (2, 3) and np.array_equal(model.jnt_axis[slides], np.eye(3)[: len(slides)])
+        if not (upright and along and all(j in on for j in slides)):
+            return None
+        drives = [on[j] for j in slides]
+        return Site("tool_drive", tuple(d.names[0] for d in drives), tuple(d.actuators[0] for d in drives))
+
+    @cached_property
+    def touching(self) -> bool:
+        """Whether two geoms of the scene could ever touch, by its pairs and its contact masks."""
+        model = self.model
+        if model.npair:
+            return True
+        one, other = np.triu_indices(model.ngeom, 1)
+        weld = model.body_weldid[model.geom_bodyid]
+        parent = model.body_weldid[model.body_parentid[weld]]
+        masks = (model.geom_contype[one] & model.geom_conaffinity[other]) | (
+            model.geom_contype[other] & model.geom_conaffinity[one]
+        )
+        family = ((parent[one] == weld[other]) & (weld[other] > 0)) | ((parent[other] == weld[one]) & (weld[one] > 0))
+        return bool(np.any((masks != 0) & (weld[one] != weld[other]) & ~family))
+
+
+def slides_in_plane(model: mujoco.MjModel, body: int) -> bool:
+    """Whether a body of the world has slides along x and y, perhaps a hinge about z after them, and nothing else."""
+    count, own = int(model.body_jntnum[body]), slice(model.body_jntadr[body], None)
+    return bool(
+        count in (2, 3)
+        and model.body_parentid[body] == 0
+        and model.jnt_type[own][:count].tolist() == [_SLIDE, _SLIDE, _HINGE][:count]
+        and np.array_equal(model.jnt_axis[own][:count], np.eye(3)[:count])
+        and np.array_equal(model.body_quat[body], [1, 0, 0, 0])
+        and not model.jnt_pos[own][:count].any()
+    )
+
+
+def drive_kind(model: mujoco.MjModel, actuator: int) -> SiteKind:
+    """What an actuator is told: a position, a speed, a force; or something else (muscles, gains that vary)."""
+    fixed = model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_FIXED
+    affine = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
+    plain = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_NONE
+    dynamics = mujoco.mjtDyn(int(model.actuator_dyntype[actuator]))
+    integrated = dynamics == mujoco.mjtDyn.mjDYN_INTEGRATOR
+    followed = dynamics in (mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT)
+    stiffness, damping = -model.actuator_biasprm[actuator, 1:3]
+    if fixed and affine and stiffness > 0 and (integrated or followed):
+        return "velocity_drive" if integrated else "position_drive"
+    if fixed and affine and stiffness == 0 and damping > 0 and followed:
+        return "velocity_drive"
+    return "effort_drive" if fixed and plain and followed else "other_drive"
+
+
+def in_words(kinds: Collection[SiteKind]) -> str:
+    """Kinds of site as a message names them: 'hinge or slide'."""
+    if set(kinds) >= set(MOVING):
+        return "joint or moving body"
+    if set(kinds) >= set(DRIVES):
+        return "drive"
+    wider = [k for k in kinds if not (k in LYING and "planar" in kinds) and not (k == "table" and "lying" in kinds)]
+    return " or ".join(_WORDS.get(kind, kind.replace("_", " ")) for kind in wider)
+
+
+def names_of(sites: Iterable[Site]) -> tuple[str, ...]:
+    """All names of some sites, in their order."""
+    return tuple(name for site in sites for name in site.names)
