@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached, Effect
@@ -72,7 +72,7 @@ def _on_movers(effect: Effect, simulator: Simulator, joints: Mapping[str, JointS
                 continue
             own = tuple(dict.fromkeys(site.kind for site in sites))
             mistaken = any(places.of(site.name, effect.on) != site for site in sites)  # for a joint of the same name
-            yield Attached(replace(effect, on=own) if mistaken else effect, names)
+            yield Attached(effect.on_kinds(own) if mistaken else effect, names)
 
 
 def _on_drives(effect: Effect, simulator: Simulator, told: tuple[Floats, Floats, Floats]) -> Iterator[Attached]:

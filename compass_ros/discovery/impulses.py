@@ -8,7 +8,7 @@ time, so the weights interpolate linearly.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -76,7 +76,7 @@ def impulses(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> Impulses
     episodes, duration = len(likelihood.inputs), float(likelihood.time_s.max())
     half = duration / MOMENTS
     moments = half * (np.arange(MOMENTS) + 0.5)
-    attached = [Attached(replace(_PUSH, on=(site.kind,)), site.names) for site in sites]
+    attached = [Attached(_PUSH.on_kinds((site.kind,)), site.names) for site in sites]
     pushed = simulator.with_effects([*simulator.effects, *attached])
     inputs = likelihood.inputs + fit.point.launch
     of_movers = _size(simulator, likelihood, fit)

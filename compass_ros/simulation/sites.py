@@ -221,7 +221,8 @@ def drive_kind(model: mujoco.MjModel, actuator: int) -> SiteKind:
         return "velocity_drive" if integrated else "position_drive"
     if fixed and affine and stiffness == 0 and damping > 0 and followed:
         return "velocity_drive"
-    return "effort_drive" if fixed and plain and followed else "other_drive"
+    by_force = plain or (affine and stiffness == 0 and damping == 0)
+    return "effort_drive" if fixed and by_force and followed else "other_drive"
 
 
 def in_words(kinds: Collection[SiteKind]) -> str:

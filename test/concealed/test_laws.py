@@ -78,7 +78,7 @@ def _modest(own: Ingredient, base: Played) -> Ingredient:
 def _library(name: str, own: Ingredient, base: Played) -> Floats:
     """What the simulator says with its own effect of that name, at the quantities that the answer would state."""
     effect = EFFECTS[name]
-    objects = own.objects if effect.on in {"objects", "walls"} else ()
+    objects = own.objects if effect.moves or effect.on_walls else ()
     simulator = Simulator(cell(), [Attached(effect, objects)], threads=1)
     played = table().play([own])
     terms = in_library_terms(own, played)

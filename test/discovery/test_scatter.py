@@ -108,4 +108,7 @@ def test_a_scatter_that_does_not_predict_is_dropped() -> None:
 
 def test_a_scatter_is_no_law() -> None:
     assert "stroke_jitter" not in {c.name for c in asked_of_table()}
-    assert [c.name for c in scattered(simulator(), simulator().defaults, actions(3), np.tile(np.linspace(0, 2.5, 50), (3, 1)))] == ["stroke_jitter"]
+    assert [
+        c.name
+        for c in scattered(simulator(), simulator().defaults, actions(3), np.tile(np.linspace(0, 2.5, 50), (3, 1)))
+    ] == ["stroke_jitter"]

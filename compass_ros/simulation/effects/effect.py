@@ -105,6 +105,10 @@ class Effect:
         """Whether it can act on a site."""
         return site.kind in self.on and not (self.unable is not None and self.unable(model, site))
 
+    def on_kinds(self, kinds: tuple[SiteKind, ...]) -> Effect:
+        """The same on some of its kinds of site alone."""
+        return replace(self, on=kinds)
+
     def at(self, size: JointSize | DriveSize) -> Effect:
         """The same with the quantities that it has on such a joint or drive, and on its kind alone."""
         quantities = self.quantities

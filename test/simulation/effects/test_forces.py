@@ -78,12 +78,7 @@ IN_SPACE = {"viscous_drag", "quadratic_drag"}
 
 @pytest.mark.parametrize(
     ("name", "kind"),
-    [
-        (name, kind)
-        for name in FORMULAS
-        for kind in ("planar", "sliding", "free")
-        if kind != "free" or name in IN_SPACE
-    ],
+    [(name, kind) for name in FORMULAS for kind in ("planar", "sliding", "free") if kind != "free" or name in IN_SPACE],
 )
 def test_a_force_is_what_its_formula_says(name: str, kind: str) -> None:
     numbers, acceleration = FORMULAS[name]

@@ -1,0 +1,147 @@
+"""Laws on joints: the size that first order finds is the one that was planted, in any units; told by closed motions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from compass_ros.discovery.candidates import candidates
+from compass_ros.discovery.tangents import score
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import Attached, Exported, FittedEffect, attach, effect, read_effects, write_effects
+from compass_ros.simulation.sizes import JointSize, unit_joint
+from compass_ros.types import Floats
+from test.simulation.robots import recorded, robot, shots, space_of
+
+LAWS = ("coulomb_friction", "viscous_drag", "quadratic_drag", "stribeck_friction", "spring")
+UNITS = [(1.0, 1.0), (1024.0, 1.0), (1 / 1024, 1.0), (1.0, 1024.0), (1 / 4096, 1 / 64)]
+"""Sizes of a unit of force and of length: N m in kN m and mN m, m in mm, a robot of a watchmaker."""
+
+
+def told(simulator: Simulator, inputs: Floats) -> tuple[Floats, Floats, Floats]:
+    return simulator.defaults, inputs, np.tile(np.linspace(0, 1.0, 60), (len(inputs), 1))
+
+
+def first_order(folder: Path, kind: str, law: str, force: float, length: float, gravity: bool) -> tuple[float, float]:
+    """What first order finds of what was planted, as a share of it, and what it gains."""
+    cell = robot(folder, (kind,), (), force, length, gravity)
+    simulator, inputs = Simulator(cell, threads=1), shots(cell, 4, length=length if kind == "slide" else 1.0)
+    (asked,) = [c for c in candidates(simulator, *told(simulator, inputs)) if c.name == law]
+    planted = [0.3 * q.scale if q.amplitude else q.start for q in asked.attached.effect.quantities]
+    found = score(space_of(simulator, recorded(simulator, [asked.attached], planted, inputs)), asked)
+    return float(found.numbers[0] / planted[0]), found.gain
+
+
+@pytest.mark.parametrize("gravity", [True, False], ids=["gravity", "weightless"])
+@pytest.mark.parametrize("kind", ["hinge", "slide"])
+@pytest.mark.parametrize("law", ["coulomb_friction", "viscous_drag", "quadratic_drag", "spring"])
+def test_first_order_finds_the_size_that_was_planted(tmp_path: Path, kind: str, law: str, gravity: bool) -> None:
+    share, gain = first_order(tmp_path, kind, law, 1.0, 1.0, gravity)
+    assert share == pytest.approx(1, abs=0.03)
+    assert gain > 40
+
+
+@pytest.mark.parametrize("kind", ["hinge", "slide"])
+@pytest.mark.parametrize("law", LAWS)
+def test_units_change_nothing(tmp_path: Path, kind: str, law: str) -> None:
+    found = [first_order(tmp_path, kind, law, force, length, True) for force, length in UNITS]
+    share, gain = np.array(found).T
+    np.testing.assert_allclose(share, share[0], rtol=5e-3)
+    np.testing.assert_allclose(gain, gain[0], rtol=5e-3)
+
+
+@pytest.mark.parametrize(("force", "length"), UNITS)
+def test_sizes_of_a_joint_are_in_its_own_units(tmp_path: Path, force: float, length: float) -> None:
+    joints = ("hinge", "slide", "hinge")
+    plain, other = robot(tmp_path, joints), None
+    before = Simulator(plain, threads=1)
+    inputs = shots(plain, 3)
+    expected = before.joint_sizes(*told(before, inputs))
+    other = robot(tmp_path, joints, (), force, length)
+    simulator = Simulator(other, threads=1)
+    units = [length if a.name[0] != "u" and joints[int(a.name[1:])] == "slide" else 1.0 for a in other.action]
+    found = simulator.joint_sizes(*told(simulator, inputs * units))
+    for name, kind in zip(("j0", "j1", "j2"), joints, strict=True):
+        of_force, of_length = (force * length, 1.0) if kind == "hinge" else (force, length)
+        one, two = expected[name], found[name]
+        assert (two.kind, two.length_unit) == (kind, "rad" if kind == "hinge" else "m")
+        numbers = (two.inertia, two.speed, two.fastest, two.spread, two.force)
+        of_unit = (of_force / of_length, of_length, of_length, of_length, of_force)
+        told_there = (one.inertia, one.speed, one.fastest, one.spread, one.force)
+        np.testing.assert_allclose(np.array(numbers) / of_unit, told_there, rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("joints", "drives", "expected"),
+    [
+        (("hinge",), (), 0.4 * 0.1**2 + 0.4 * 0.02**2 + 4e-3),
+        (("slide",), (), 0.4),
+        (("slide", "slide"), (), 0.8),
+    ],
+)
+def test_the_inertia_is_the_joints_own(
+    tmp_path: Path, joints: tuple[str, ...], drives: tuple[str, ...], expected: float
+) -> None:
+    cell = robot(tmp_path, joints, drives)
+    simulator = Simulator(cell, threads=1)
+    assert simulator.joint_sizes(*told(simulator, shots(cell, 2)))["j0"].inertia == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("gravity", [True, False])
+@pytest.mark.parametrize("drive", ["", "position", "motor"])
+def test_the_force_of_a_joint_that_is_held_is_what_holds_it(tmp_path: Path, drive: str, gravity: bool) -> None:
+    """A still arm's own motion says nothing of its forces; a joint that never moves has sizes too, and finite ones."""
+    cell = robot(tmp_path, ("hinge",), (drive,) if drive else (), gravity=gravity)
+    simulator = Simulator(cell, threads=1)
+    size = simulator.joint_sizes(*told(simulator, np.zeros((2, len(cell.input_names)))))["j0"]
+    assert all(np.isfinite(x) and x > 0 for x in (size.inertia, size.speed, size.fastest, size.spread, size.force))
+    weight = 0.4 * 9.81 * 0.02 if gravity else 0.0
+    assert size.force >= 0.4 * weight
+
+
+@pytest.mark.parametrize(("speed", "step"), [(1.0, 1e-3), (1000.0, 1e-3), (1e-3, 1e-3), (1.0, 1e-2), (1.0, 1e-4)])
+def test_friction_on_a_joint_stops_it_and_holds_it(speed: float, step: float) -> None:
+    """After speed / deceleration, in any unit and with any time step, without a jerk back."""
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="{step}" gravity="0 0 0"/><worldbody><body><joint name="rail" type="slide"/>'
+        '<geom size=".1" mass="2"/></body></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    data.qvel[0] = speed
+    friction = Attached(effect("coulomb_friction").at(unit_joint("slide")), ("rail",))
+    slowest = []
+    with attach(model, data, Exported((FittedEffect(friction, (2.0 * speed / 0.5,), ()),), {})):
+        while data.time < 0.9 - 0.5 * step:
+            mujoco.mj_step(model, data)
+            slowest.append(data.qvel[0])
+    assert data.qpos[0] == pytest.approx(0.5 * speed * 0.5, rel=0.03)
+    assert min(slowest) > -1e-3 * speed
+    assert abs(slowest[-1]) < 1e-3 * speed
+
+
+def test_a_spring_swings_with_its_frequency() -> None:
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><option timestep="1e-4" gravity="0 0 0"/><worldbody><body><joint name="axis" type="hinge"/>'
+        '<inertial pos="0 0 0" mass="1" diaginertia="1 1 0.25"/></body></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    spring = Attached(effect("spring").at(unit_joint("hinge")), ("axis",))
+    with attach(model, data, Exported((FittedEffect(spring, (4.0, 0.3), ()),), {})):
+        mujoco.mj_step(model, data, nstep=round(np.pi / 4.0 / 1e-4))
+    assert data.qpos[0] == pytest.approx(0.6, rel=1e-3)  # half a period of 2 pi / sqrt(4 / 0.25)
+
+
+@pytest.mark.parametrize("kind", ["hinge", "slide"])
+@pytest.mark.parametrize("law", LAWS)
+def test_a_law_on_a_joint_comes_back_from_its_file_with_kind_and_units(tmp_path: Path, law: str, kind: str) -> None:
+    size = JointSize(kind, 0.5, 2.0, 5.0, 0.1, 1.0, 3.0)  # type: ignore[arg-type]
+    sized = effect(law).at(size)
+    values = tuple(0.5 * q.high for q in sized.quantities)
+    write_effects([FittedEffect(Attached(sized, ("it",)), values, values)], {}, tmp_path / "effects.yaml")
+    (back,) = read_effects(tmp_path / "effects.yaml").effects
+    assert (back.values, back.attached.objects, back.attached.effect.on) == (values, ("it",), (kind,))
+    assert [q.unit for q in back.attached.effect.quantities] == [q.unit for q in sized.quantities]
+    assert all(q.low <= q.start <= q.high and 0 < q.scale <= q.high - q.low for q in sized.quantities)
