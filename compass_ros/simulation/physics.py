@@ -115,7 +115,7 @@ class Physics:
         return start
 
     def controls(self, values: Floats, inputs: Floats, steps: int) -> Floats | None:
-        """(B, T, n) what drives MuJoCo (`drives.parts`), controls as the drives follow them; None where nothing does."""
+        """(B, T, n) what drives MuJoCo (`drives.parts`), controls as actuators follow them; None where nothing does."""
         if not self.drives.size:
             return None
         nu, command = self.model.nu, self.of_command(inputs)

@@ -106,9 +106,7 @@ def joint_sizes(
     return out
 
 
-def _moment(
-    model: mujoco.MjModel, data: mujoco.MjData, state: Floats, told: Floats | None, parts: int
-) -> Floats:
+def _moment(model: mujoco.MjModel, data: mujoco.MjData, state: Floats, told: Floats | None, parts: int) -> Floats:
     """(5, nv) own inertia, position, speed, force of gravity and of what drives each degree of freedom in a state."""
     mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
     if told is not None:
@@ -118,7 +116,9 @@ def _moment(
     for joint in range(model.njnt):
         if model.jnt_type[joint] in ONE_DOF:
             position[model.jnt_dofadr[joint]] = data.qpos[model.jnt_qposadr[joint]]
-    return np.stack([data.qM[model.dof_Madr], position, data.qvel, data.qfrc_bias, data.qfrc_actuator + data.qfrc_applied])
+    return np.stack(
+        [data.qM[model.dof_Madr], position, data.qvel, data.qfrc_bias, data.qfrc_actuator + data.qfrc_applied]
+    )
 
 
 def _rms(values: Floats) -> float:

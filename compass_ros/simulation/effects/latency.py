@@ -1,4 +1,4 @@
-"""Stamps of an encoder that are later than the moment that it was read.
+"""Stamps of an encoder, or of another sensor, that are later than the moment that it was read.
 
 observed(t) = true(t - latency). Source: transfer over a bus before stamping; the sensing of `camera_latency`.
 """
@@ -9,4 +9,4 @@ from dataclasses import replace
 
 from compass_ros.simulation.effects import camera_latency
 
-EFFECT = replace(camera_latency.EFFECT, name="latency", sentence="a latency of the encoders", on=("encoder",))
+EFFECT = replace(camera_latency.EFFECT, name="latency", sentence="a latency of the sensors", on=("encoder", "sensor"))
