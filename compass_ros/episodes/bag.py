@@ -19,6 +19,7 @@ __all__ = [
     "RawMessage",
     "RawTopic",
     "Remark",
+    "bag_name",
     "bag_of",
     "decode",
     "is_bag",
@@ -96,6 +97,11 @@ def _number(file: Path) -> tuple[int, str]:
     """Order of the files of a recording that was split: NAME_0, NAME_1, ..., NAME_10."""
     match = re.search(r"_(\d{1,9})\.", file.name)
     return int(match[1]) if match else 0, file.name
+
+
+def bag_name(path: Path) -> str:
+    """What a bag is called that does not say its episode's name: its folder, or its file without endings."""
+    return path.resolve().name if path.is_dir() else Path(packed.plain_name(path)).stem
 
 
 def bag_of(path: Path) -> Path:

@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 
 import zstandard
 
+from compass_ros.episodes.raw import one_line
 from compass_ros.errors import BagError
 
 LARGEST_MESSAGE = 256 * 2**20
@@ -78,6 +79,6 @@ def _blocks(packed: Iterable[bytes]) -> Iterator[bytes]:
                 yield frame.decompress(rest)
                 rest = frame.unused_data
     except zstandard.ZstdError as error:
-        raise BagError(f"not packed with zstd, or damaged: {error}") from error
+        raise BagError(f"not packed with zstd, or damaged: {one_line(error)}") from error
     if not frame.eof:
         raise BagError("truncated: packed with zstd, and the end is missing")

@@ -45,5 +45,6 @@ def type_name(name: str) -> str:
 
 
 def one_line(error: Exception) -> str:
-    """What a library says of a damaged file."""
-    return " ".join(str(error).split()) or type(error).__name__
+    """What a library says of a damaged file: at most 200 letters."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text if len(text) <= 200 else f"{text[:197]}..."

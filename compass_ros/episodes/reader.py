@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from compass_ros.episodes.bag import RawMessage, RawTopic, Remark, decode, is_bag, scan
+from compass_ros.episodes.bag import RawMessage, RawTopic, Remark, bag_name, decode, is_bag, scan
 from compass_ros.episodes.definitions import EPISODE_TYPES, SHOT_TYPES, STRING_TYPE
 from compass_ros.episodes.measured import left_out, measured
 from compass_ros.episodes.notes import NOTES_TOPIC, SHOT_TOPIC, EpisodeHeader, Notes, Shot, header, notes, shot
@@ -164,7 +164,7 @@ class _Content:
 
 
 def _episode(path: Path, content: _Content, cell: str, cell_hash: str) -> Episode:
-    head = content.headers[0] if content.headers else EpisodeHeader("finished", path.stem)
+    head = content.headers[0] if content.headers else EpisodeHeader("finished", bag_name(path))
     if cell and head.cell and head.cell != cell:
         raise BagError(f"recorded in another cell: expected '{cell}', found '{head.cell}'")
     if cell_hash and head.cell_hash and head.cell_hash != cell_hash:
@@ -175,7 +175,7 @@ def _episode(path: Path, content: _Content, cell: str, cell_hash: str) -> Episod
     fired = _fired(content.shots, head)
     first_ns = min((int(track.stamp_ns[0]) for track in tracks), default=0)
     return Episode(
-        name=head.episode or path.stem,
+        name=head.episode or bag_name(path),
         cell=head.cell or cell,
         cell_hash=head.cell_hash,
         action=fired.action if fired else {},

@@ -35,7 +35,8 @@ def messages(path: Path) -> Iterator[RawTopic | RawMessage]:
                     yield topics[connection.id]
                 yield RawMessage(topics[connection.id], log_ns, data)
     except BROKEN as error:
-        raise BagError(f"not a readable ROS 1 bag: {one_line(error)}") from error
+        hint = "; `rosbag reindex` of ROS 1 does it" if "not indexed" in str(error) else ""
+        raise BagError(f"not a readable ROS 1 bag: {one_line(error)}{hint}") from error
 
 
 class _BoundedReader(Reader):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import struct
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -14,10 +16,17 @@ import scipy.io
 from openpyxl.utils.exceptions import InvalidFileException  # type: ignore[import-untyped]
 
 from compass_ros.episodes.delimited import read_rows
+from compass_ros.episodes.raw import one_line
 from compass_ros.episodes.table import Table
 from compass_ros.episodes.table_rows import Row, tables_of
 from compass_ros.errors import DataError
 from compass_ros.types import Floats
+
+_DAMAGED = (
+    *(OSError, EOFError, ValueError, TypeError, LookupError, OverflowError, MemoryError, RuntimeError),
+    *(struct.error, zlib.error, zipfile.BadZipFile),
+)
+"""What the libraries raise on damaged files of all these kinds; an XML that is none is a SyntaxError."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +52,8 @@ def xlsx_tables(path: Path, selection: Selection) -> Iterator[Table]:
     try:
         with path.open("rb") as file:
             book = openpyxl.load_workbook(file, data_only=True)
-    except (OSError, InvalidFileException, zipfile.BadZipFile, KeyError, ValueError) as error:
-        raise DataError(f"cannot be read as an Excel workbook (.xlsx): {error}") from error
+    except (*_DAMAGED, InvalidFileException, SyntaxError, AttributeError) as error:
+        raise DataError(f"cannot be read as an Excel workbook (.xlsx): {one_line(error)}") from error
     for sheet in book.worksheets:
         if fnmatchcase(sheet.title, selection.pattern):
             lines = enumerate(sheet.iter_rows(values_only=True), sheet.min_row)
@@ -55,7 +64,7 @@ def xlsx_tables(path: Path, selection: Selection) -> Iterator[Table]:
 def npz_tables(path: Path, selection: Selection) -> Iterator[Table]:
     """The arrays whose name matches, one table each, columns numbered; or arrays side by side."""
     try:
-        with np.load(path, allow_pickle=False) as arrays:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             if "=" in selection.pattern:
                 yield from _side_by_side(path, arrays, _wanted(selection.pattern, arrays))
                 return
@@ -64,8 +73,8 @@ def npz_tables(path: Path, selection: Selection) -> Iterator[Table]:
             for index, (key, array) in enumerate(numbers.items(), 1):
                 columns = {str(i): c for i, c in enumerate(np.reshape(array, (len(array), -1)).astype(float).T)}
                 yield _of_arrays(path, index, key, columns)
-    except (OSError, ValueError, TypeError, zipfile.BadZipFile) as error:
-        raise DataError(f"cannot be read as NPZ with arrays of numbers: {error}") from error
+    except _DAMAGED as error:
+        raise DataError(f"cannot be read as NPZ with arrays of numbers: {one_line(error)}") from error
 
 
 def mat_tables(path: Path, selection: Selection) -> Iterator[Table]:
@@ -81,8 +90,8 @@ def mat_tables(path: Path, selection: Selection) -> Iterator[Table]:
     except NotImplementedError as error:
         hint = "save it again in MATLAB with the option '-v7': save('FILE.mat', 'VARIABLE', '-v7')"
         raise DataError(f"MAT files of version 7.3 (HDF5) are not read; {hint}") from error
-    except (OSError, ValueError, TypeError, IndexError, scipy.io.matlab.MatReadError) as error:
-        raise DataError(f"cannot be read as MAT with numbers: {error}") from error
+    except (*_DAMAGED, scipy.io.matlab.MatReadError) as error:
+        raise DataError(f"cannot be read as MAT with numbers: {one_line(error)}") from error
 
 
 FORMATS: Mapping[str, Callable[[Path, Selection], Iterator[Table]]] = {

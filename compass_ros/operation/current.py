@@ -11,6 +11,7 @@ import numpy as np
 from compass_ros.cells import Cell
 from compass_ros.cells.auto import with_auto
 from compass_ros.episodes import Source, default_sources, find_bags, read_episode
+from compass_ros.episodes.bag import bag_name
 from compass_ros.reporting.result_json import read_result
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects.exported import read_effects
@@ -113,4 +114,4 @@ def read(cell: Cell, bag: Path | str) -> Episode:
 
 def held_out_bags(bags: Sequence[str], names: Sequence[str]) -> tuple[Path, ...]:
     """Those bags among the paths that are named as these episodes are. Raises BagError where there is no bag at all."""
-    return tuple(bag for bag in find_bags(bags) if bag.name in names)
+    return tuple(bag for bag in find_bags(bags) if bag_name(bag) in names)

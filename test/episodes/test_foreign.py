@@ -16,6 +16,7 @@ from rosbags.rosbag2 import CompressionMode, StoragePlugin
 from compass_ros.episodes import Source, find_bags, list_topics, read_bag, read_episode
 from compass_ros.episodes.definitions import POSE_TYPE, embedded_definition
 from compass_ros.errors import BagError
+from compass_ros.operation.current import held_out_bags
 from test.episodes.foreign import FORMATS, FRAMES, POSITION, SOURCES, STAMPS, TURN, all_bags, write_ros1, write_rosbag2
 from test.episodes.planted import pose_bytes
 
@@ -59,6 +60,31 @@ def test_all_formats_list_the_same_topics(bags: list[Path]) -> None:
 
 def test_bags_are_found_in_a_folder(bags: list[Path]) -> None:
     assert sorted(find_bags([bags[0].parent])) == sorted(bags)
+
+
+@pytest.mark.parametrize(
+    ("path", "name"),
+    [
+        ("toss.1/toss.1.mcap", "toss.1"),
+        ("投げ/投げ_0.mcap", "投げ"),
+        ("toss.1.mcap", "toss.1"),
+        ("2024-05-01.12.mcap.zstd", "2024-05-01.12"),
+        ("a b.db3", "a b"),
+    ],
+)
+def test_recordings_are_called_as_their_files(tmp_path: Path, path: str, name: str) -> None:
+    """A point in a name is no ending: `toss.1` and `toss.2` are two episodes."""
+    storage = StoragePlugin.SQLITE3 if path.endswith("db3") else StoragePlugin.MCAP
+    compression = CompressionMode.FILE if path.endswith("zstd") else CompressionMode.NONE
+    (file,) = (
+        f for f in write_rosbag2(tmp_path / "made", storage, range(3), compression).iterdir() if f.suffix != ".yaml"
+    )
+    target = tmp_path / path
+    target.parent.mkdir(exist_ok=True)
+    file.rename(target)
+    bag = target.parent if "/" in path else target
+    assert read_episode(bag, SOURCES).name == name
+    assert held_out_bags([str(bag)], [name]) == (bag,)
 
 
 def test_a_frame_that_is_not_there(bags: list[Path]) -> None:
@@ -173,6 +199,16 @@ def test_ros1_bags_cut_off(tmp_path: Path, share: float) -> None:
     path = write_ros1(tmp_path / "x.bag")
     path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
     with pytest.raises(BagError, match=r"x\.bag: not a readable ROS 1 bag"):
+        read_episode(path, SOURCES)
+
+
+def test_a_ros1_bag_without_its_index_says_what_gives_it_one(tmp_path: Path) -> None:
+    path = write_ros1(tmp_path / "x.bag")
+    content = bytearray(path.read_bytes())
+    at = content.index(b"index_pos=") + len(b"index_pos=")
+    content[at : at + 8] = bytes(8)
+    path.write_bytes(content)
+    with pytest.raises(BagError, match=r"x\.bag: not a readable ROS 1 bag: .*not indexed.*rosbag reindex"):
         read_episode(path, SOURCES)
 
 
