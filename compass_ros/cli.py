@@ -15,6 +15,7 @@ from compass_ros.commands import (
     conceal,
     demo,
     diagnose,
+    evaluate,
     plan,
     policy,
     prove,
@@ -33,7 +34,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for module in (demo, plan, track, record, calibrate, diagnose, report, policy):
+for module in (demo, plan, track, record, calibrate, evaluate, diagnose, report, policy):
     module.add_to(app)
 for module in (conceal, unseal, prove, rivals, bench, real, tables):
     module.add_to(app)

@@ -214,6 +214,7 @@ def assemble(
 ) -> Result:
     """Gaps on all episodes for each model, tables and drawings."""
     values = found.parameters if found.parameters is not None else estimate.values
+    alone = np.full(len(values), np.nan) if found.parameters is None else estimate.values
     std, identifiable = estimate.std, estimate.identifiable
     if found.std is not None:  # beside an effect a parameter can be less sure than it was alone
         std = found.std
@@ -235,8 +236,8 @@ def assemble(
         0.5,
     )
     rows = tuple(
-        ParameterRow(p.name, p.unit, p.default, float(v), float(s), (p.low, p.high), bool(a), bool(i))
-        for p, v, s, a, i in zip(cell.parameters, values, std, graph.active(), identifiable, strict=True)
+        ParameterRow(p.name, p.unit, p.default, float(v), float(s), (p.low, p.high), bool(a), bool(i), float(w))
+        for p, v, s, a, i, w in zip(cell.parameters, values, std, graph.active(), identifiable, alone, strict=True)
     )
     drawn = _draw(cell, data, {n: (r[0], r[2]) for n, r in replays.items()}, held_out=False)
     if held_out:

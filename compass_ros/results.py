@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from compass_ros.cells import Cell
+from compass_ros.cells.loading import cells_folder
 from compass_ros.discovery import Discovery
 from compass_ros.discovery.maps import TableMap
 from compass_ros.errors import ConfigError
@@ -36,6 +39,8 @@ def write_all(
         _map(found.after),
         dict(truth or {}),
     )
+    if cell.path.parent != cells_folder():
+        result = replace(result, cell_file=os.path.relpath(cell.path, out))
     write_report(result, out / REPORT, extras)
     write_trajectories(result, out / TRAJECTORIES, extras)
     write_result(result, out / RESULT)

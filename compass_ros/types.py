@@ -290,6 +290,13 @@ class ParameterRow:
     active: bool
     """It matters: it has an edge in the causal graph."""
     identifiable: bool
+    without_laws: float = math.nan
+    """Value of the simulator with calibrated parameters alone, where `value` is the one beside laws; else NaN."""
+
+    @property
+    def calibrated(self) -> float:
+        """Value of the simulator with calibrated parameters alone."""
+        return self.value if math.isnan(self.without_laws) else self.without_laws
 
     @property
     def error_bars(self) -> float:
@@ -410,5 +417,7 @@ class Result:
     warnings: Sequence[str] = ()
     unit: Unit = "m"
     """Of gap and noise floor."""
+    cell_file: str = ""
+    """YAML of the cell from the folder of the result; empty for a cell of the suite's own."""
     together: tuple[Together, ...] = ()
     """Parameters that are told only together."""

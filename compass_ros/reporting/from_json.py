@@ -44,6 +44,7 @@ def from_json(content: Json) -> Result:
         gap={model: _gaps(gap[model]) for model in MODELS if gap[model] is not None},
         noise_floor_m=_number(gap["noise_floor_m"]),
         unit=gap.get("unit", "m"),
+        cell_file=content.get("cell_file", ""),
         parameters=tuple(_parameter(row) for row in content["parameters"]),
         together=tuple(Together(tuple(g["parameters"]), g["ratios"]) for g in content.get("together", ())),
         graph=Graph(
@@ -89,6 +90,7 @@ def _parameter(row: Json) -> ParameterRow:
         bounds=(_number(row["bounds"][0]), _number(row["bounds"][1])),
         active=row["active"],
         identifiable=row["identifiable"],
+        without_laws=_number(row.get("without_laws")),
     )
 
 

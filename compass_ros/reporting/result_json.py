@@ -58,6 +58,7 @@ def _parameter(row: ParameterRow) -> dict[str, Any]:
         "active": bool(row.active),
         "identifiable": bool(row.identifiable),
         "wrong": row.wrong,
+        "without_laws": _number(row.without_laws),
     }
 
 
@@ -127,6 +128,7 @@ def to_json(result: Result) -> dict[str, Any]:
     return {
         "schema": SCHEMA_ID,
         "cell": result.cell,
+        "cell_file": result.cell_file,
         "method": result.method,
         "seed": int(result.seed),
         "cancelled": bool(result.cancelled),
