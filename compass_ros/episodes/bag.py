@@ -125,11 +125,14 @@ def _scan_folder(folder: Path) -> Iterator[RawTopic | RawMessage | Remark]:
     digests = {(topic.name, topic.type): topic.digest for topic in summary.topics} if summary else {}
     found = 0
     for file in files:
+        full: dict[int, RawTopic] = {}  # by identity: a comparison for each message would cost as much as its reading
         for item in scan_file(file):
-            topic = item if isinstance(item, RawTopic) else item.topic
-            full = replace(topic, digest=topic.digest or digests.get((topic.name, topic.type), ""))
-            found += isinstance(item, RawMessage)
-            yield full if isinstance(item, RawTopic) else replace(item, topic=full)
+            if isinstance(item, RawTopic):
+                full[id(item)] = replace(item, digest=item.digest or digests.get((item.name, item.type), ""))
+                yield full[id(item)]
+            else:
+                found += 1
+                yield RawMessage(full[id(item.topic)], item.log_ns, item.data)
     if not found:
         raise BagError(f"{folder}: empty, it holds no messages")
     if summary and found != summary.messages:
