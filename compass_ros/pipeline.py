@@ -13,7 +13,7 @@ import numpy as np
 
 from compass_ros.calibration.causal_map import causal_map_refined
 from compass_ros.calibration.identifiability import IDENTIFIED
-from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.likelihood import GROWING, IN_WINDOWS, Likelihood
 from compass_ros.calibration.methods import compass_config, method
 from compass_ros.calibration.noise import Noise, measure_noise
 from compass_ros.calibration.problem import Allowance, Problem
@@ -157,6 +157,7 @@ def pose(simulator: Simulator, data: Recordings, noise: Noise) -> Problem:
         predict=simulator.observe,
         predict_alike=simulator.observe_alike,
         difference=partial(apart, cell),
+        horizons=IN_WINDOWS if cell.spec.windows else GROWING,
         parameters=simulator.parameters,
         inputs=simulator.inputs(data.inputs),
         time_s=data.time_s,

@@ -34,8 +34,6 @@ from compass_ros.calibration.screen import WORTH, acting, coupling, independent,
 from compass_ros.calibration.valleys import along_valleys
 from compass_ros.types import Floats, Ints
 
-HORIZONS = (0.16, 0.28, 0.4, 0.55, 0.75, 1.0)
-"""Shares of the episode, in turn."""
 FELT = 2.0
 """A parameter is free where half a prior width of it moves all recordings together by more than this many sigma."""
 STRONG = 60.0
@@ -128,7 +126,7 @@ class Refined:
 def refine(likelihood: Likelihood, values: Floats, watch: Watch = lambda *_: True) -> Refined:
     """Fit from the given (P,) values."""
     for stage, (_, fit) in enumerate(growing(likelihood, values), 1):
-        if not watch("refine", 0.7 * stage / len(HORIZONS), fit.point):
+        if not watch("refine", 0.7 * stage / len(likelihood.horizons), fit.point):
             return polish(likelihood, fit.point, watch)
     return polish(calmed(likelihood, fit.linear), fit.point, watch)
 
@@ -143,10 +141,10 @@ def growing(likelihood: Likelihood, values: Floats, held: Ints = NONE) -> Iterat
     first, share_asked = sensitivity(few, start(few, values)), len(few.inputs) / len(likelihood.inputs)
     strong = np.setdiff1d(first.felt(STRONG * np.sqrt(share_asked), STRONG_SHARE), held)
     steps, onset = first.steps.copy(), None
-    for share in HORIZONS:
+    for share in likelihood.horizons:
         part = likelihood.until(share * float(likelihood.time_s.max()))
         robust = max(ROBUST, 3.0 * typical_residual(part, point))
-        last = share == HORIZONS[-1]
+        last = share == likelihood.horizons[-1]
         tolerance = 1.0 if last else 5.0
         fit = minimise(part, point, strong, 4, robust, tolerance, steps=steps[strong], fresh=last, onset=onset)
         point, steps[strong], onset = fit.point, difference_steps(fit.linear), fit.linear.onset
