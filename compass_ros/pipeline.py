@@ -13,7 +13,7 @@ import numpy as np
 
 from compass_ros.calibration.causal_map import causal_map_refined
 from compass_ros.calibration.identifiability import IDENTIFIED
-from compass_ros.calibration.likelihood import GROWING, IN_WINDOWS, Likelihood
+from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.methods import compass_config, method
 from compass_ros.calibration.noise import Noise, measure_noise
 from compass_ros.calibration.problem import Allowance, Problem
@@ -64,10 +64,7 @@ def calibrate(
     told = []
     for turn in range(2):
         fit, held_out = split(used, config, turn)
-        data, judge = (
-            recordings(cell, evenly(windows(cell, fit), config.episodes)),
-            recordings(cell, windows(cell, held_out or fit)),
-        )
+        data, judge = (recordings(cell, evenly(windows(cell, e), config.episodes)) for e in (fit, held_out or fit))
         judge = judge.numbered(len(data.names))
         simulator = simulator.driven(data.drives + judge.drives)
         noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
@@ -157,7 +154,7 @@ def pose(simulator: Simulator, data: Recordings, noise: Noise) -> Problem:
         predict=simulator.observe,
         predict_alike=simulator.observe_alike,
         difference=partial(apart, cell),
-        horizons=IN_WINDOWS if cell.spec.windows else GROWING,
+        windowed=cell.spec.windows is not None,
         parameters=simulator.parameters,
         inputs=simulator.inputs(data.inputs),
         time_s=data.time_s,

@@ -18,7 +18,7 @@ STEPS = ("cells", "tracking", "episodes", "simulation", "calibration", "discover
 JOINS = {
     "pipeline": 3,
     "results": 3,
-    "evaluation": 3,
+    "evaluation": 4,
     "operation": 3,
     "concealed": 3,
     "bench": 4,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
 from compass_ros.cells import Cell
@@ -48,18 +47,15 @@ def drawn_truth(cell: Cell, seed: int) -> Floats:
     return np.asarray(np.clip(drawn, low, high))
 
 
-def excitation(cell: Cell, model: mujoco.MjModel, routine: Routine, seed: int) -> tuple[Floats, Floats]:
-    """(n,) times [s] and (n, D) targets of the cell's one input: positions of joints, inside their limits."""
-    spec = _position_input(cell)
+def excitation(limits: Floats, routine: Routine, seed: int) -> tuple[Floats, Floats]:
+    """(n,) times [s] and (n, D) targets for joints with (D, 2) lowest and highest positions, infinite where free."""
     rng = np.random.default_rng([seed, 12])
     time = np.arange(0, routine.seconds, 1 / routine.rate_hz)
     highest = max(int(routine.fastest_hz / routine.base_hz), 1)
-    out = np.zeros((len(time), len(spec.numbers)))
-    for i, actuator in enumerate(spec.targets):
-        joint = model.joint(int(model.actuator(actuator).trnid[0]))
-        limited = bool(model.jnt_limited[joint.id])
-        low, high = joint.range if limited else (-routine.reach, routine.reach)
-        middle, room = 0.5 * (low + high), min(routine.reach, 0.45 * (high - low))
+    out = np.zeros((len(time), len(limits)))
+    for i, (low, high) in enumerate(limits):
+        middle = 0.5 * (low + high) if np.isfinite(low + high) else 0.0
+        room = min(routine.reach, 0.45 * (high - low))
         orders = rng.choice(np.arange(1, highest + 1), min(routine.harmonics, highest), replace=False)
         phases = rng.uniform(0, 2 * np.pi, len(orders))
         waves = np.sin(2 * np.pi * routine.base_hz * np.outer(time, orders) + phases) / np.sqrt(orders)
@@ -75,7 +71,8 @@ def record(cell: Cell, truth: Floats, count: int, routine: Routine, seed: int, t
     """
     spec = _position_input(cell)
     simulator = Simulator(cell, threads=threads)
-    tables = [excitation(cell, simulator.physics.model, routine, 1000 * seed + i) for i in range(count)]
+    limits = simulator.limits(spec.targets)
+    tables = [excitation(limits, routine, 1000 * seed + i) for i in range(count)]
     simulator = simulator.driven([Drive((_held(time),), (_first_held(target),)) for time, target in tables])
     inputs = np.zeros((count, len(cell.input_names)))
     first = [name.rpartition(".")[0].rpartition(".")[2] for name in cell.input_names]

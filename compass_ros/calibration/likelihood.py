@@ -68,7 +68,8 @@ class Likelihood:
     predict_alike: PredictAlike | None = None
     """The same model as `predict`: who replaces one replaces both. None: nothing is known of what rows share."""
     difference: Difference = plain_difference
-    horizons: tuple[float, ...] = GROWING
+    windowed: bool = False
+    """Whether these are windows of long recordings, each with a first state of its own."""
 
     @property
     def low(self) -> Floats:
@@ -82,6 +83,11 @@ class Likelihood:
     def tunable(self) -> Bools:
         """(P,) False where the bounds leave a parameter no room."""
         return self.high > self.low
+
+    @property
+    def horizons(self) -> tuple[float, ...]:
+        """Shares of an episode that are fitted in turn."""
+        return IN_WINDOWS if self.windowed else GROWING
 
     @property
     def measurements(self) -> int:

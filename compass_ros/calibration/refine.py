@@ -34,6 +34,10 @@ from compass_ros.calibration.screen import WORTH, acting, coupling, independent,
 from compass_ros.calibration.valleys import along_valleys
 from compass_ros.types import Floats, Ints
 
+OF_WINDOWS = 2
+"""Gauss-Newton steps for the first states of windows: within their noise the motion is linear in them."""
+SMOOTH = 1.01
+"""Growth of sigma by the simulator's roughness up to which differences of one length are as good as of another."""
 FELT = 2.0
 """A parameter is free where half a prior width of it moves all recordings together by more than this many sigma."""
 STRONG = 60.0
@@ -161,7 +165,8 @@ def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True)
     watch("refine", 0.85, fit.point)
     rough = with_roughness(likelihood, fit)
     linear = scaled(fit.linear, likelihood, rough)
-    fit = settled(rough, replace(fit, linear=linear, robust=ROBUST))
+    smooth = likelihood.windowed and bool(np.max(rough.sigma / likelihood.sigma) < SMOOTH)
+    fit = settled(rough, replace(fit, linear=linear, robust=ROBUST), rounds=1 if smooth else 2)
     watch("refine", 1.0, fit.point)
     spread = covariance(rough, fit)
     own = alone(spread[: len(felt), : len(felt)])
@@ -196,12 +201,12 @@ def some(likelihood: Likelihood) -> Likelihood:
     return likelihood.of(np.arange(0, episodes, every)) if episodes >= 2 * every else likelihood
 
 
-def settled(likelihood: Likelihood, fit: Fit) -> Fit:
+def settled(likelihood: Likelihood, fit: Fit, rounds: int = 2) -> Fit:
     """The last steps to the optimum: Gauss-Newton with short central differences, which serve several steps.
 
     Along a valley that coupled parameters share, their effects cancel to a hundredth. Differences that are wrong by
     some per cent, as those of `minimise` are, end there, tens of log likelihood above the optimum. What a step has
-    shown is added to them (Broyden): the shapes of a field bend the valley.
+    shown is added to them (Broyden): the shapes of a field bend the valley. `rounds`: of differences, at least.
     """
     free, robust, linear = fit.free, fit.robust, fit.linear
     point = replace(fit.point, cost=float(cost(likelihood, [fit.point], robust)[0][0]))
@@ -220,7 +225,7 @@ def settled(likelihood: Likelihood, fit: Fit) -> Fit:
             if step < SETTLED:
                 break
         unexplained = point.cost - 0.5 * likelihood.measurements
-        if taken > 0 and before - point.cost < max(SETTLED, WORTHWHILE * unexplained):
+        if taken >= rounds - 1 and before - point.cost < max(SETTLED, WORTHWHILE * unexplained):
             break
     return replace(fit, point=point, linear=linear)
 
@@ -305,7 +310,8 @@ def with_launches(likelihood: Likelihood, values: Floats, free: Ints = NONE, ste
     if not likelihood.launch_std.any() and not len(free):
         return point
     robust = max(ROBUST, 3.0 * typical_residual(likelihood, point))
-    return minimise(likelihood, point, free, 12, robust, tolerance=1.0, fresh=False, steps=steps).point
+    most = OF_WINDOWS if likelihood.windowed and not len(free) else 12
+    return minimise(likelihood, point, free, most, robust, tolerance=1.0, fresh=False, steps=steps).point
 
 
 def standard_errors(refined: Refined) -> tuple[Ints, Floats]:

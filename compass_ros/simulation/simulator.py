@@ -147,6 +147,13 @@ class Simulator:
         """Where physics can act in the scene."""
         return self.physics.places
 
+    def limits(self, actuators: Sequence[str]) -> Floats:
+        """(N, 2) lowest and highest position of the joint that each actuator drives; infinite where it has none."""
+        model = self.physics.model
+        joints = [int(model.actuator(name).trnid[0]) for name in actuators]
+        ranges = np.array([model.jnt_range[j] if model.jnt_limited[j] else (-np.inf, np.inf) for j in joints])
+        return ranges.reshape(-1, 2)
+
     def movers(self) -> tuple[str, ...]:
         """Names of tracked bodies that slide in the plane and of tracked joints: what a force along the way acts on."""
         return tuple(self.moving)
