@@ -256,7 +256,7 @@ def assemble(
         trace=estimate.trace,
         replays=drawn,
         cancelled=estimate.stop_reason.startswith("cancelled"),
-        warnings=found.warnings,
+        warnings=(*found.warnings, *simulator.warnings),
         unit=simulator.unit,
         together=estimate.together,
     )

@@ -10,6 +10,7 @@ from mujoco.rollout import Rollout
 
 from compass_ros.simulation.native.program import Programs
 from compass_ros.simulation.physics import Physics
+from compass_ros.simulation.warned import Warned
 from compass_ros.types import Floats
 
 
@@ -21,6 +22,7 @@ class Player:
         self.threads = threads or len(os.sched_getaffinity(0))
         self.rollouts = 0
         self.simulated_seconds = 0.0
+        self.warned = Warned()
         self._scene = scene
         self._models = [copy.copy(scene)]
         self._data = [mujoco.MjData(scene) for _ in range(self.threads)]
@@ -41,12 +43,13 @@ class Player:
         self, physics: Physics, values: Floats, start: Floats, controls: Floats | None, steps: int
     ) -> tuple[Floats, Floats]:
         """(B, T, s) states and (B, T, nsensordata) sensors after each of T steps from (B, s) states on."""
-        models = self.written(physics, values)
         mujoco.set_mjcb_time(None)  # MuJoCo's profiler, on since an MjData was made, costs a quarter of a rollout
-        with Programs(models, physics.terms(values)):
-            states, sensors = self._pool.rollout(
-                models, self._data, start, controls, control_spec=physics.drives.parts, nstep=steps
-            )
+        with self.warned.counting():
+            models = self.written(physics, values)
+            with Programs(models, physics.terms(values)):
+                states, sensors = self._pool.rollout(
+                    models, self._data, start, controls, control_spec=physics.drives.parts, nstep=steps
+                )
         self.rollouts += len(values)
         self.simulated_seconds += len(values) * steps * physics.time_step
         return states, sensors

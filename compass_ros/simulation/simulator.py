@@ -82,6 +82,11 @@ class Simulator:
         """The same in simulated time."""
         return self._player.simulated_seconds
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What MuJoCo has warned of in these rollouts: one line, or none."""
+        return self._player.warned.said(self.rollouts)
+
     def with_effects(self, effects: Sequence[Attached]) -> Simulator:
         """The same cell with other effects. Shares threads, models and counters with this one: use one at a time."""
         other = copy.copy(self)
