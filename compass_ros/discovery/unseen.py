@@ -174,7 +174,8 @@ def predict(unseen: Likelihood, fitted: Likelihood, fit: Fit, untaught: Untaught
     linear = linearise(judged, point, free, steps)
     taught, p, random = len(fit.free), len(free), judged.launch_std > 0
     own = block_diag(*linear.launch_jacobian.reshape(len(judged.inputs), judged.measured[0].size, -1))
-    residual, jacobian = linear.residual.ravel(), np.hstack([linear.jacobian.reshape(-1, p), own])
+    residual = linear.residual.ravel()
+    jacobian = np.hstack([linear.jacobian.reshape(len(residual), p), own])
     precision = np.eye(jacobian.shape[1])
     precision[:taught, :taught] = np.linalg.inv(covariance(fitted, fit)[:taught, :taught])
     moved = (point.values - judged.prior_mean)[untaught.which] / judged.prior_std[untaught.which]

@@ -47,9 +47,10 @@ def episode_rmse(replay: Replay, model: str) -> float:
 
 
 def plane(replays: Sequence[Replay]) -> tuple[int, int]:
-    """The two coordinates to draw: x and y, or those with the widest motion where tracks are spatial."""
-    spatial = [t.real[:, :3] for replay in replays for t in replay.tracks if t.real.shape[1] >= 3]
-    if not spatial:
+    """The two coordinates to draw: x and y, or those with the widest motion where all that have a place are spatial."""
+    placed = [t.real[:, :3] for replay in replays for t in replay.tracks if t.real.shape[1] >= 2]
+    spatial = [real for real in placed if real.shape[1] == 3]
+    if len(spatial) < max(len(placed), 1):
         return 0, 1
     everything = np.concatenate(spatial)
     spread = np.nanmax(everything, axis=0) - np.nanmin(everything, axis=0)

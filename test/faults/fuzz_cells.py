@@ -19,7 +19,6 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from compass_ros.cells import load
 from compass_ros.commands.calibrate import ProgressStyle, run
 from compass_ros.errors import CompassError
 from test.faults.random_cells import drawn, recorded
@@ -66,17 +65,16 @@ def main(count: int = 200, first: int = 0) -> int:
             with tempfile.TemporaryDirectory() as name:
                 try:
                     ended = attempt(Path(name), seed)
-                except Exception:  # all are counted, and the last line and the status tell of them
+                except Exception:  # noqa: BLE001 - the last line and the status tell how many there were
                     ended = Ended("traceback", traceback.format_exc())
             seconds.append(time.process_time() - began)
             verdicts[ended.verdict] += 1
             print(f"cell {seed}: {ended.verdict}, {seconds[-1]:.1f} s{': ' * bool(ended.said)}{ended.said}", flush=True)
     refused, broken = verdicts.pop("refused", 0), verdicts.pop("traceback", 0)
     results = ", ".join(f"{n} {verdict}" for verdict, n in verdicts.most_common())
-    print(
-        f"{count} cells: {verdicts.total()} results ({results}), {refused} refused in one line, {broken} tracebacks; processor time "
-        f"{np.median(seconds):.1f} s in the median, at most {max(seconds):.0f} s, {sum(seconds):.0f} s in all; load {os.getloadavg()[0]:.1f}"
-    )
+    spent = f"{np.median(seconds):.1f} s in the median, at most {max(seconds):.0f} s, {sum(seconds):.0f} s in all"
+    print(f"{count} cells: {verdicts.total()} results ({results}), {refused} refused in one line, {broken} tracebacks")
+    print(f"processor time {spent}; load average {os.getloadavg()[1]:.1f}")
     return int(broken > 0)
 
 

@@ -203,6 +203,16 @@ def test_spatial_tracks_are_drawn_in_the_plane_of_motion(result: Result) -> None
     assert len(data["episodes"][0]["tracks"][0]["real"]) == 2
 
 
+@pytest.mark.parametrize("widths", [(7, 2), (3, 2), (2, 3, 1), (1, 2), (7, 2, 1), (7, 1)])
+def test_tracks_of_every_width_are_drawn_together(result: Result, widths: tuple[int, ...]) -> None:
+    time = np.arange(9) / 30
+    paths = [np.sin(np.outer(time, 1 + np.arange(width))) for width in widths]
+    tracks = tuple(ReplayedTrack(f"body{i}", time, p, p + 0.1, p + 0.01, None) for i, p in enumerate(paths))
+    data = figure_data(replace(result, replays=(Replay("mixed", True, tracks),)), ReportExtras())
+    assert [len(track["real"]) for track in data["episodes"][0]["tracks"]] == [min(width, 2) for width in widths]
+    assert data["axes"] == (["x", "y"] if 2 in widths else data["axes"])
+
+
 def test_joint_tracks_have_errors_and_no_table(result: Result) -> None:
     data = figure_data(spatial(result, 1), ReportExtras())
     assert len(data["episodes"][0]["tracks"][0]["real"]) == 1
