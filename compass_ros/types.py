@@ -157,6 +157,18 @@ class Episode:
 
 
 @dataclass(frozen=True)
+class LeftOut:
+    """A recording that could not be used with others."""
+
+    bag: str
+    """Its path, as it was named."""
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.bag} was left out: {self.reason}"
+
+
+@dataclass(frozen=True)
 class Progress:
     """One step of a long computation, handed to a callback."""
 
@@ -254,8 +266,6 @@ class Estimate:
     stop_reason: str
     """One sentence: why it stopped."""
     together: tuple[Together, ...] = ()
-    note: str = ""
-    """What else a user should know of these values; empty where nothing."""
 
 
 @dataclass(frozen=True)
@@ -421,5 +431,7 @@ class Result:
     """Of gap and noise floor."""
     cell_file: str = ""
     """YAML of the cell from the folder of the result; empty for a cell of the suite's own."""
+    left_out: tuple[LeftOut, ...] = ()
+    """Recordings that were named and could not be used."""
     together: tuple[Together, ...] = ()
     """Parameters that are told only together."""

@@ -31,7 +31,16 @@ JOINS = {
     "nodes": 6,
     "program": 7,
 }
-LAYERS = {"types": 0, "errors": 0, "plain_yaml": 0, "config": 1, **dict.fromkeys(STEPS, 2), **JOINS}
+LAYERS = {
+    "types": 0,
+    "errors": 0,
+    "plain_yaml": 0,
+    "places": 0,
+    "config": 1,
+    "progress": 1,
+    **dict.fromkeys(STEPS, 2),
+    **JOINS,
+}
 """A module imports from lower layers, or from its own part."""
 
 HOMES = {
@@ -42,7 +51,7 @@ HOMES = {
     ("cv2",): {"tracking"},
     ("rosbags", "mcap", "mcap_ros2"): {"episodes"},
     ("rclpy", "launch", "launch_ros", "ament_index_python", "rcl_interfaces", "action_msgs"): {"nodes"},
-    ("builtin_interfaces", "std_msgs", "std_srvs", "sensor_msgs", "geometry_msgs"): {"nodes"},
+    ("builtin_interfaces", "std_msgs", "std_srvs", "sensor_msgs", "geometry_msgs", "tf2_msgs"): {"nodes"},
     ("visualization_msgs", "nav_msgs", "lifecycle_msgs", "diagnostic_msgs", "compass_ros_interfaces"): {"nodes"},
     ("domain_coordinator",): {"nodes", "demo"},
 }

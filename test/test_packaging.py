@@ -112,11 +112,11 @@ def test_ros2_run_finds_a_stub_that_starts_the_node(node: str) -> None:
     assert (PREFIX / "share/ament_index/resource_index/packages/compass_ros").is_file()
     stub = PREFIX / "lib" / "compass_ros" / node
     assert os.access(stub, os.X_OK)
-    # With a parameter that ROS cannot parse the node ends before it says anything to anybody.
+    # With a parameter that ROS cannot parse the node ends, in one line, before it says anything to anybody.
     environment = os.environ | {"PATH": "/usr/bin:/bin"}
     done = subprocess.run(
         [stub, "--ros-args", "-p", "seed"], env=environment, capture_output=True, text=True, check=False
     )
     assert done.returncode
-    assert f"compass_ros/nodes/{node}.py" in done.stderr
+    assert done.stderr.splitlines()[-1].startswith(f"{node}: failed to initialize rcl: Couldn't parse parameter")
     assert "Couldn't parse parameter override rule" in done.stderr

@@ -101,31 +101,33 @@ def run(
     """Calibrate, write everything into `out`, print the tables; `repeat` is the command line that the report gives."""
     from compass_ros.cells import load
     from compass_ros.config import calibration_config
-    from compass_ros.episodes import read_episodes
-    from compass_ros.operation.current import sources
+    from compass_ros.operation.current import read_usable
     from compass_ros.operation.doubts import doubts
     from compass_ros.pipeline import calibrate as pipeline
+    from compass_ros.progress import Steady
     from compass_ros.reporting import print_result
     from compass_ros.results import make_writable, write_all
 
     started = time.monotonic()
     validated = calibration_config(config, "command line")
     cell = load(cell_name, validated.parameters)
-    episodes = read_episodes(bags, sources(cell), cell.name, cell.hash)
+    reading = read_usable(cell, bags)
     make_writable(out)  # now, and not after minutes of work
-    said = doubts(cell, episodes)
+    said = doubts(cell, reading.episodes)
 
     def write(result: Result, found: Discovery) -> Result:
         budget = replace(result.budget, wall_seconds=time.monotonic() - started)
-        result = replace(result, budget=budget, warnings=(*said, *result.warnings))
+        result = replace(result, budget=budget, warnings=(*said, *result.warnings), left_out=reading.left_out)
         write_all(result, found, cell, out, repeat)
         return result
 
     with _shown(style) as report:
-        result = write(*pipeline(episodes, cell, validated, report, write))
+        steady = Steady(report)
+        result = write(*pipeline(reading.episodes, cell, validated, steady, write))
+        steady.end("written")
     if style is ProgressStyle.bar:
         print_result(result)
-        for warning in result.warnings:
+        for warning in (*reading.left_out, *result.warnings):
             typer.echo(f"note: {warning}", err=True)
         print(f"report: {os.path.relpath(out / 'report.html')}")
 

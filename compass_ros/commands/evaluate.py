@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,17 +27,19 @@ def evaluate(
 ) -> None:
     """Say how well a result predicts recordings that it has not seen: rms, floor and share removed, by signal."""
     from compass_ros.cells import load
-    from compass_ros.episodes import read_episodes
     from compass_ros.evaluation import evaluate as judge
-    from compass_ros.operation.current import sources
+    from compass_ros.operation.current import read_usable
     from compass_ros.reporting.result_json import read_result
 
     folder = result.parent if result.name == "result.json" else result
     content = read_result(folder / "result.json")
     loaded = load(cell or _cell_of(folder, content))
-    episodes = read_episodes(bags, sources(loaded), loaded.name, loaded.hash)
-    said = judge(loaded, folder, episodes, threads)
-    typer.echo(json.dumps(to_json(said), indent=1)) if as_json else show(said)
+    reading = read_usable(loaded, bags)
+    said = judge(loaded, folder, reading.episodes, threads)
+    left_out = [asdict(one) for one in reading.left_out]
+    typer.echo(json.dumps(to_json(said) | {"left_out": left_out}, indent=1)) if as_json else show(said)
+    for one in reading.left_out:
+        typer.echo(f"note: {one}", err=True)
 
 
 def _cell_of(folder: Path, content: dict[str, Any]) -> str:

@@ -33,9 +33,8 @@ def rivals(
     """Let parameters alone, sparse regression, a misspecification test and a Gaussian process judge the recordings."""
     from compass_ros.cells import load
     from compass_ros.config import calibration_config
-    from compass_ros.episodes import read_episodes
     from compass_ros.errors import ConfigError, nearest
-    from compass_ros.operation.current import sources
+    from compass_ros.operation.current import read_usable
     from compass_ros.reporting.atomic import write_text
     from compass_ros.rivals.run import RIVALS, Recorded
 
@@ -47,7 +46,8 @@ def rivals(
     config = calibration_config(
         {"seed": seed, "rollouts": rollouts, "held_out_share": held_out, "threads": threads}, "command line"
     )
-    given = Recorded(read_episodes(bags, sources(known), known.name, known.hash), known, config)
+    reading = read_usable(known, bags)
+    given = Recorded(reading.episodes, known, config)
     said: dict[str, tuple[Opinion, float]] = {}
     for name in names:
         began = time.monotonic()
@@ -55,7 +55,11 @@ def rivals(
     content = {
         "schema": "compass/rivals/1",
         "cell": known.name,
-        "episodes": {"fit": given.data.names, "held_out": given.judge.names},
+        "episodes": {
+            "fit": given.data.names,
+            "held_out": given.judge.names,
+            "left_out": [asdict(one) for one in reading.left_out],
+        },
         "rivals": {name: asdict(opinion) | {"seconds": round(s, 2)} for name, (opinion, s) in said.items()},
     }
     out.parent.mkdir(parents=True, exist_ok=True)

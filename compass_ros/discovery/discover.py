@@ -51,7 +51,7 @@ def discover(
         return Discovery(Mismatch("data_bad", None, (), (), "", f"These recordings cannot answer: {error}."))
 
     def tell(stage: str, done: float) -> bool:
-        return report(Progress(stage, 0, 0.7 + 0.3 * done, float("nan"), float("nan")))
+        return report(Progress(stage, 0, done, float("nan"), float("nan")))
 
     tell("screen effects", 0.0)
     plain = followed(refined.likelihood, refined.fit)

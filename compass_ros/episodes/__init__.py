@@ -5,6 +5,7 @@ The bag is the only hand-over from a live cell to a calibration. One bag holds o
 """
 
 from compass_ros.episodes.episode_writer import write_episode
+from compass_ros.episodes.many import Reading, find_each, read_each
 from compass_ros.episodes.reader import (
     BagContent,
     TopicSummary,
@@ -19,13 +20,16 @@ from compass_ros.episodes.sources import Source, default_sources
 
 __all__ = [
     "BagContent",
+    "Reading",
     "Recovery",
     "Source",
     "TopicSummary",
     "default_sources",
     "find_bags",
+    "find_each",
     "list_topics",
     "read_bag",
+    "read_each",
     "read_episode",
     "read_episodes",
     "recover",

@@ -14,6 +14,7 @@ from compass_ros.episodes.definitions import EPISODE_TYPE, SHOT_TYPE, Definition
 from compass_ros.episodes.latched import Latched
 from compass_ros.episodes.names import episode_name, next_name
 from compass_ros.episodes.notes import EPISODE_TOPIC, SHOT_TOPIC, EpisodeHeader, Shot, State, header_bytes, shot_bytes
+from compass_ros.episodes.pulse import Pulse
 from compass_ros.episodes.recovery import unfinished
 from compass_ros.episodes.writer import BagWriter
 from compass_ros.errors import BagError
@@ -62,15 +63,17 @@ class Recorder:
 
         Raises BagError: the folder cannot be written, or another recorder holds it.
         """
-        self.folder = folder
+        self.folder = folder.expanduser().absolute()
+        """Bags are announced by paths in it, so they mean the same to whoever hears of them."""
         self._min_free_bytes = min_free_bytes
         self._max_duration_ns = max_duration_ns
-        self._lock = _hold(folder)
+        self._lock = _hold(self.folder)
         self._connections: dict[str, Connection] = {}
         self._latched: dict[str, Latched] = {}
         self._sequences: dict[str, int] = {}
         self._writer: BagWriter | None = None
         self._losses = _Losses()
+        self._pulse = Pulse()
         self._start_ns = 0
         self.status = EpisodeHeader(state="finished", episode="", message=self._unfinished())
         """What became of the last episode, or how the present one stands. No name: there was none yet."""
@@ -114,6 +117,7 @@ class Recorder:
         writer = BagWriter(self.folder / name)
         self._writer, self._losses, self._start_ns = writer, _Losses(), now_ns
         self._sequences.clear()
+        self._pulse = Pulse()
         self.status = EpisodeHeader("recording", name, cell, cell_hash, now_ns, bag=str(writer.folder))
         for connection in (_headers(), *self._connections.values()):
             _declare(writer, connection)
@@ -147,16 +151,22 @@ class Recorder:
             if gap > 0:
                 self._losses.lost[topic] = self._losses.lost.get(topic, 0) + gap
             self._sequences[topic] = sequence
+        self._pulse.beat(topic, log_ns)
         self._write(connection, log_ns, publish_ns, data)
 
     def overdue(self, now_ns: int) -> bool:
         """Whether the episode has lasted longer than it may."""
         return self.recording and 0 < self._max_duration_ns < now_ns - self._start_ns
 
-    def stop(self, why: str = "") -> EpisodeHeader:
-        """End the episode and make its bag whole. Raises BagError: none is running, or the disk refuses."""
+    def stop(self, why: str = "", now_ns: int | None = None) -> EpisodeHeader:
+        """End the episode and make its bag whole; at `now_ns`, or with its last message.
+
+        What a person should know of the episode is in `message`: that it holds no data, what was lost, what stopped.
+        Raises BagError: none is running, or the disk refuses.
+        """
         writer = self._running()
-        said = self._described("finished", why)
+        silent = self._silent(self._pulse.newest_ns if now_ns is None else now_ns)
+        said = self._described("finished", "; ".join(filter(None, (why, self._empty(), *silent))))
         self._write(_headers(), writer.last_ns, writer.last_ns, header_bytes(replace(said, bag="")))
         try:
             writer.close()
@@ -168,12 +178,26 @@ class Recorder:
         return said
 
     def discard(self) -> EpisodeHeader:
-        """End the episode and delete its bag. Raises BagError: none is running, or the disk refuses."""
-        writer = self._running()
-        self.status = self._described("discarded")
-        self._writer = None
-        writer.delete()
+        """Delete the bag of the present episode, which ends, or of the last one, once.
+
+        Raises BagError: there is none, or the disk refuses.
+        """
+        if self._writer is None:
+            self._delete_last()
+        else:
+            writer, self.status = self._writer, self._described("discarded")
+            self._writer = None
+            writer.delete()
         return self.status
+
+    def _delete_last(self) -> None:
+        if not self.status.bag or self.status.state not in ("finished", "failed"):
+            raise BagError("no episode is being recorded, and there is no last one to discard")
+        try:
+            shutil.rmtree(self.status.bag)
+        except OSError as error:
+            raise BagError(f"{self.status.bag}: cannot be deleted: {error.strerror}") from error
+        self.status = replace(self.status, state="discarded", message="")
 
     def close(self) -> None:
         """Let go of the folder. An episode that is still running stays without an end and can be recovered."""
@@ -202,6 +226,15 @@ class Recorder:
         steps = self._writer.clock_steps if self._writer is not None else 0
         stepped = [f"the clock stepped back {steps} time{'s' * (steps != 1)}"] if steps else []
         return (*lost, *self._losses.retyped, *stepped)
+
+    def _silent(self, end_ns: int) -> list[str]:
+        return [f"{topic} stopped {s:.1f} s before the end" for topic, s in self._pulse.stopped(end_ns).items()]
+
+    def _empty(self) -> str:
+        if self._pulse:
+            return ""
+        topics = len(self._connections)
+        return f"no data: no message came on {'any of its topics' if topics else 'any topic, none has a publisher'}"
 
     def _running(self) -> BagWriter:
         if self._writer is None:

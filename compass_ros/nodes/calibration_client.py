@@ -8,19 +8,26 @@ from __future__ import annotations
 
 import json
 import math
-import sys
+import time
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 import rclpy
 from compass_ros_interfaces.action import Calibrate
+from compass_ros_interfaces.msg import CalibrationStatus
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.task import Future
 
+from compass_ros.errors import CompassError
+from compass_ros.nodes.qos import LATCHED
+from compass_ros.nodes.run import connected
+
+REASON_S = 2.0
+"""[s] How long the reason of a refusal may take after it."""
 FIELDS = ("stage", "iteration", "share_done", "gap", "unit", "sparsity", "seconds_left")
 
 
@@ -42,6 +49,8 @@ class CalibrationClient(Node):
             output=declare("output", "", "folder of the result; empty: the calibrator's own"),
         )
         self._action = ActionClient(self, Calibrate, "calibrator/calibrate")
+        self._said = ""
+        self.create_subscription(CalibrationStatus, "calibrator/status", self._on_status, LATCHED)
 
     def run(self) -> str:
         """Send the goal and wait for its end; a sentence about what went wrong, or nothing."""
@@ -51,7 +60,7 @@ class CalibrationClient(Node):
         rclpy.spin_until_future_complete(self, sent)
         handle: ClientGoalHandle = sent.result()
         if not handle.accepted:
-            return "the calibrator does not take the goal"
+            return self._refusal()
         answer: Future = handle.get_result_async()
         try:
             rclpy.spin_until_future_complete(self, answer)
@@ -59,9 +68,29 @@ class CalibrationClient(Node):
             rclpy.spin_until_future_complete(self, handle.cancel_goal_async(), timeout_sec=2.0)
             raise
         result = answer.result().result
-        names = ("success", "message", "result_json", "gap_nominal", "gap_calibrated", "unit", "verdict", "sentence")
+        names = (
+            "success",
+            "message",
+            "result_json",
+            "gap_nominal",
+            "gap_calibrated",
+            "unit",
+            "verdict",
+            "sentence",
+            "left_out",
+        )
         say({name: getattr(result, name) for name in names})
         return "" if result.success else str(result.message)
+
+    def _on_status(self, status: CalibrationStatus) -> None:
+        self._said = status.message
+
+    def _refusal(self) -> str:
+        """Why the goal was not taken: the status says so, at about the time of the answer."""
+        deadline = time.monotonic() + REASON_S
+        while not self._said.startswith("refused") and time.monotonic() < deadline:
+            rclpy.spin_once(self, timeout_sec=0.05)
+        return self._said or "the calibrator does not take the goal, and does not say why"
 
 
 def _on_feedback(message: Any) -> None:
@@ -78,16 +107,11 @@ def say(content: Mapping[str, object]) -> None:
 
 
 def main() -> None:
-    # The signal is Python's own, so that the client is still connected when it cancels.
-    rclpy.init(signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
-    try:
+    # A signal is Python's own, so that the client is still connected when it cancels.
+    with connected("calibration_client"), suppress(KeyboardInterrupt):
         error = CalibrationClient().run()
         if error:
-            sys.exit(f"calibration_client: {error}")
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        rclpy.try_shutdown()
+            raise CompassError(error)
 
 
 if __name__ == "__main__":

@@ -8,31 +8,30 @@ from __future__ import annotations
 import math
 import threading
 import time
-from pathlib import Path
 
 from compass_ros_interfaces.action import Calibrate
-from compass_ros_interfaces.msg import CalibrationStatus, CausalGraph, EpisodeInfo, Mismatch, SimParameters
+from compass_ros_interfaces.msg import CalibrationStatus, EpisodeInfo
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange
-from rclpy.action import ActionClient, ActionServer, CancelResponse
+from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from compass_ros.cells import load
-from compass_ros.errors import CompassError, ConfigError, shown
+from compass_ros.errors import CompassError, ConfigError
 from compass_ros.nodes import convert
+from compass_ros.nodes.calibrator_parameters import bags_of, declare_calibrator, output_of, request_of
+from compass_ros.nodes.findings import Findings, answer
 from compass_ros.nodes.job import Job, Outcome, Request, Step
 from compass_ros.nodes.journal import cut_off
 from compass_ros.nodes.managed import ManagedNode
 from compass_ros.nodes.operator import Operator
 from compass_ros.nodes.qos import LATCHED
-from compass_ros.nodes.requests import checked_output, checked_paths, one_line
+from compass_ros.nodes.requests import one_line
 from compass_ros.nodes.run import run
 from compass_ros.operation.current import current
 from compass_ros.operation.desk import Desk
-from compass_ros.reporting.result_json import read_result
 
 POLL_S = 0.05
 """[s] How often a running calibration is looked at: delay of its progress and of a cancel."""
@@ -41,59 +40,33 @@ END_S = 5.0
 """[s] How long the end of a calibration may take when the node is told to end."""
 
 
-class BusyError(CompassError):
-    """A calibration is running, and another one was asked for."""
-
-
 class Calibrator(ManagedNode):
-    """Every calibration is a goal of the action `~/calibrate`, also those that the service or the start asks for."""
+    """Every calibration is a goal of the action `~/calibrate`, also those that the service or the start asks for.
+
+    A goal that is accepted runs already: what cannot start is refused, with the reason in the log and in `~/status`.
+    """
 
     def __init__(self) -> None:
         super().__init__("calibrator")
         self._recorded: list[str] = []
         self._running: Job | None = None
+        self._own_goal: Calibrate.Goal | None = None
         self._operator: Operator | None = None
         self._claim = threading.Lock()
         self._status = CalibrationStatus()
-        self._declare()
-
-    def _declare(self) -> None:
-        natural = [IntegerRange(from_value=0, to_value=2**63 - 1, step=1)]
-        declare = self.declare_described
-        # One path is accepted where a list is expected, hence the dynamic type.
-        paths = "paths of bags, or of folders that hold bags: one, or a list; empty: only what the recorder finishes"
-        declare("bags", "", paths, dynamic_typing=True)
-        declare("seed", 0, "seed of all random numbers", integer_range=natural)
-        declare("rollouts", 0, "budget of simulated rollouts [count]; 0: the method's default", integer_range=natural)
-        declare("method", "default", "as `compass calibrate --method`")
-        newest = "of the episodes that the recorder finishes, only so many of the newest are read; of more than 100 "
-        newest += "a calibration uses an even choice of 100"
-        declare("newest", 100, newest, integer_range=[IntegerRange(from_value=1, to_value=10_000, step=1)])
-        declare("calibrate_at_start", True, "calibrate when the node becomes active, if `bags` names any")
-        declare("resume", True, "calibrate anew when the node was killed in a calibration; false: only say so")
-        self.declare_fixed("cell", "air_hockey", "name of a cell, or path of its YAML")
-        output = "folder of the result; an earlier result there is replaced when the new one is complete. Goals of the "
-        output += "action may name other folders beside it, or deeper"
-        self.declare_fixed("output", "out/calibration", output)
-        versions = "folder of the versions of the parameters that a person has applied"
-        self.declare_fixed("versions", "out/versions", versions)
-        self.declare_fixed("running_check", True, "compare each new episode with the simulator in force")
-        rate = "the running check: probability of ever asking for a calibration though nothing has changed"
-        limits = [FloatingPointRange(from_value=1e-6, to_value=0.5)]
-        self.declare_fixed("false_alarm", 0.01, rate, floating_point_range=limits)
+        declare_calibrator(self)
 
     def configure(self) -> None:
         """Raises ConfigError for a cell that cannot be loaded."""
         cell = load(self.get_parameter("cell").value)
-        versions, false_alarm = Path(self.get_parameter("versions").value), self.get_parameter("false_alarm").value
-        desk = Desk(cell, versions, self._output(), false_alarm)
+        false_alarm = self.get_parameter("false_alarm").value
+        desk = Desk(cell, self.place("versions"), output_of(self), false_alarm)
         self._cell_name, self._unit = cell.name, current(cell, threads=1).simulator.unit
-        self._parameters_topic = self.create_publisher(SimParameters, "~/sim_parameters", LATCHED)
-        self._graph_topic = self.create_publisher(CausalGraph, "~/causal_graph", LATCHED)
-        self._mismatch_topic = self.create_publisher(Mismatch, "~/mismatch", LATCHED)
+        frame = convert.frame_of(cell, self.get_parameter("frame").value)
+        self._findings = Findings(self, frame)
         self._status_topic = self.create_publisher(CalibrationStatus, "~/status", LATCHED)
         self._diagnostics_topic = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._operator = Operator(self, desk, self.get_parameter("running_check").value)
+        self._operator = Operator(self, desk, self.get_parameter("running_check").value, self._unit, frame)
         self._tell(CalibrationStatus.IDLE)
 
         self.create_subscription(EpisodeInfo, "recorder/status", self._on_episode, 100)
@@ -102,12 +75,13 @@ class Calibrator(ManagedNode):
             Calibrate,
             "~/calibrate",
             self._execute,
+            goal_callback=self._on_goal,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
             callback_group=ReentrantCallbackGroup(),
         )
         self._own_client = ActionClient(self, Calibrate, "~/calibrate")
         self.create_service(Trigger, "~/recalibrate", self._on_recalibrate)
-        self.create_timer(1.0, self._diagnose)
+        self.every(1.0, self._diagnose)
 
     def activate(self) -> None:
         """Raises ConfigError where the versions on disk are damaged."""
@@ -115,7 +89,7 @@ class Calibrator(ManagedNode):
         self._show_earlier()
         self._first_goal = self._take_up()
         if self._first_goal is not None:
-            self._start_timer = self.create_timer(0.1, self._on_start)
+            self._start_timer = self.every(0.1, self._on_start)
 
     def deactivate(self) -> None:
         """A calibration that runs is ended."""
@@ -129,29 +103,35 @@ class Calibrator(ManagedNode):
             self._action_server.destroy()
         self._operator = None
 
+    def problems(self) -> list[str]:
+        said = super().problems()
+        if self.active and not bags_of(self) and not self.count_publishers("recorder/status"):
+            said.append(f"nobody publishes {self.resolve_topic_name('recorder/status')}: new episodes are not heard of")
+        return said
+
+    def tell(self) -> None:
+        if self._operator is not None:
+            self._show(self._status)
+
     @property
     def _the_operator(self) -> Operator:
         if self._operator is None:
             raise ConfigError("the calibrator is not configured")
         return self._operator
 
-    def _output(self) -> Path:
-        return Path(self.get_parameter("output").value)
-
     def _show_earlier(self) -> None:
         """A result that lies in the output is a proposal, also for those who look after a restart."""
-        output = self._output().expanduser().absolute()
-        if not (output / "result.json").is_file():
+        if not (output_of(self) / "result.json").is_file():
             return
         try:
-            self._publish(output / "result.json", "")
-            self._the_operator.propose(output)
+            self._findings.publish(output_of(self) / "result.json")
+            self._the_operator.propose(output_of(self))
         except ConfigError as error:
             self.get_logger().warning(one_line(str(error)))
 
     def _take_up(self) -> Calibrate.Goal | None:
         """What to begin with: a calibration that was cut off, or the bags that are named."""
-        lost = cut_off(self._output().expanduser().absolute())
+        lost = cut_off(output_of(self))
         if lost is not None:
             anew = bool(self.get_parameter("resume").value)
             message = one_line(f"{lost}; {'it begins anew' if anew else 'it is not resumed'}")
@@ -161,58 +141,59 @@ class Calibrator(ManagedNode):
                 return Calibrate.Goal(
                     bags=list(lost.bags), cell=lost.cell, seed=lost.seed, rollouts=lost.rollouts, output=lost.output
                 )
-        if self.get_parameter("calibrate_at_start").value and self.get_parameter("bags").value:
+        if self.get_parameter("calibrate_at_start").value and bags_of(self):
             return Calibrate.Goal()
         return None
 
-    def _header(self, frame: str = "") -> Header:
-        return Header(stamp=self.get_clock().now().to_msg(), frame_id=frame)
+    def _header(self) -> Header:
+        return Header(stamp=self.get_clock().now().to_msg())
 
-    def _bags(self) -> tuple[str, ...]:
-        value = self.get_parameter("bags").value
-        bags = [value] if isinstance(value, str) else list(value or ())
-        if not all(isinstance(bag, str) for bag in bags):
-            raise ConfigError(f"bags: expected a path or a list of paths, found {shown(value)}")
-        return tuple(bag for bag in bags if bag)
-
-    def _request(self, goal: Calibrate.Goal) -> Request:
-        """What the goal asks for; the node's parameters where it leaves a field empty."""
-        checked_paths(goal)
-        newest = self._recorded[-int(self.get_parameter("newest").value) :]
-        bags = tuple(goal.bags) or (*self._bags(), *newest)
-        if not bags:
-            raise ConfigError("no bags: name them in the goal or in the parameter `bags`, or record episodes")
-        return Request(
-            bags=tuple(str(Path(bag).expanduser().absolute()) for bag in bags),
-            cell=goal.cell or self.get_parameter("cell").value,
-            seed=goal.seed or self.get_parameter("seed").value,
-            rollouts=goal.rollouts or self.get_parameter("rollouts").value,
-            output=checked_output(goal.output, self._output()),
-            method=self.get_parameter("method").value,
-        )
-
-    def _begin(self, goal: Calibrate.Goal) -> Job:
-        """Raises BusyError when a calibration is running, ConfigError when this one cannot start."""
+    def _begin(self, goal: Calibrate.Goal) -> Request:
+        """Start the process of a calibration. Raises CompassError where another one runs, or this one cannot start."""
         with self._claim:
-            self._refuse_a_second()
-            self._running = Job.start(self._request(goal))
+            if self._running is not None:
+                raise CompassError(f"a calibration is already running ({self._status.share_done:.0%} done)")
+            if not self.active:
+                raise CompassError(f"the calibrator is {self.state}; activate it first")
+            request = request_of(self, goal, self._recorded)
+            self._running = Job.start(request)
             self._tell(CalibrationStatus.RUNNING)
-            return self._running
+            return request
 
-    def _refuse_a_second(self) -> None:
-        if self._running is not None:
-            raise BusyError(f"refused: a calibration is already running ({self._status.share_done:.0%} done)")
-        if not self.active:
-            raise BusyError(f"refused: the calibrator is {self.state}; activate it first")
+    def _begin_own(self, goal: Calibrate.Goal) -> Request:
+        """Start a calibration that this node asks itself for; its goal follows. Raises CompassError."""
+        request = self._begin(goal)
+        self._own_goal = goal
+        self._own_client.send_goal_async(goal)
+        return request
+
+    def _on_goal(self, goal: Calibrate.Goal) -> GoalResponse:
+        """Accept what runs."""
+        with self._claim:
+            if self._own_goal is not None and self._own_goal == goal:
+                self._own_goal = None
+                return GoalResponse.ACCEPT
+        try:
+            self._begin(goal)
+        except CompassError as error:
+            self._refuse(error)
+            return GoalResponse.REJECT
+        return GoalResponse.ACCEPT
+
+    def _refuse(self, error: CompassError) -> str:
+        """Say why nothing begins; the status goes on to tell of a calibration that runs."""
+        message = one_line(f"refused: {error}")
+        self.get_logger().error(message)
+        self._status.message = message
+        if self._running is None:
+            self._status.state = CalibrationStatus.FAILED
+        self._show(self._status)
+        return message
 
     def _execute(self, handle: ServerGoalHandle) -> Calibrate.Result:
-        try:
-            job = self._begin(handle.request)
-        except BusyError as error:  # the running one keeps the status
-            handle.abort()
-            return self._without_result(str(error))
-        except CompassError as error:
-            return self._fail(handle, one_line(str(error)))
+        job = self._running
+        if job is None:
+            raise RuntimeError("a goal was accepted, and nothing runs")
         try:
             self._follow(job, handle)
             return self._end(handle, job)
@@ -231,78 +212,69 @@ class Calibrator(ManagedNode):
                 handle.canceled()
             else:  # the node ends, or is deactivated
                 handle.abort()
-            return self._without_result(job.message)
-        answer = self._publish(job.output / "result.json", job.message)
+            return _without_result(job.message)
+        path = job.output / "result.json"
+        result = self._findings.publish(path)
         self._the_operator.propose(job.output)
-        self._tell(CalibrationStatus.SUCCEEDED, message=job.message)
+        self._tell(CalibrationStatus.SUCCEEDED, message=job.message, left_out=convert.left_out(result))
+        handle.publish_feedback(convert.feedback_message(self._status))
         handle.succeed()
-        return answer
+        return answer(result, path, job.message)
 
     def _fail(self, handle: ServerGoalHandle, message: str) -> Calibrate.Result:
         self.get_logger().error(message)
         self._tell(CalibrationStatus.FAILED, message=message)
         handle.abort()
-        return self._without_result(message)
+        return _without_result(message)
 
     def _follow(self, job: Job, handle: ServerGoalHandle) -> None:
         """Hand on progress until the job has ended; a cancel, or the end of the node, ends it."""
-        while not job.finished.wait(POLL_S):
+        ended = False
+        while not ended:
+            ended = job.finished.wait(POLL_S)
             if handle.is_cancel_requested:
                 job.cancel()
             for step in job.steps():
-                status = self._tell(CalibrationStatus.RUNNING, step)
-                feedback = Calibrate.Feedback(iteration=status.iteration, stage=status.stage)
-                feedback.gap, feedback.unit = status.gap, status.unit
-                feedback.sparsity, feedback.share_done = status.sparsity, status.share_done
-                feedback.seconds_left = status.seconds_left
-                handle.publish_feedback(feedback)
+                self._tell(CalibrationStatus.RUNNING, step)
+                handle.publish_feedback(convert.feedback_message(self._status))
 
-    def _publish(self, path: Path, message: str) -> Calibrate.Result:
-        """The result as topics and as the action's answer. Raises ConfigError when it cannot be read."""
-        result = read_result(path)
-        for warning in result["warnings"]:
-            self.get_logger().warning(one_line(warning))
-        header = self._header("table")
-        self._parameters_topic.publish(convert.parameters_message(result, header, str(path)))
-        self._graph_topic.publish(convert.graph_message(result, header))
-        self._mismatch_topic.publish(convert.mismatch_message(result, header))
-        return Calibrate.Result(
-            success=True,
-            message=message,
-            result_json=str(path),
-            gap_nominal=convert.mean_gap(result, "nominal"),
-            gap_calibrated=convert.mean_gap(result, "calibrated"),
-            unit=convert.unit(result),
-            verdict=result["mismatch"]["verdict"],
-            sentence=result["mismatch"]["sentence"],
-        )
+    def _tell(self, state: int, step: Step | None = None, message: str = "", left_out: list[str] | None = None) -> None:
+        self._show(convert.status_message(state, self._unit, step, message, left_out or []))
 
-    def _without_result(self, message: str) -> Calibrate.Result:
-        return Calibrate.Result(success=False, message=message, gap_nominal=math.nan, gap_calibrated=math.nan)
-
-    def _tell(self, state: int, step: Step | None = None, message: str = "") -> CalibrationStatus:
-        self._status = convert.status_message(state, self._header(), self._unit, step, message)
-        self._status_topic.publish(self._status)
-        return self._status
+    def _show(self, status: CalibrationStatus) -> None:
+        status.header, status.problems = self._header(), self.problems()
+        self._status = status
+        self._status_topic.publish(status)
 
     def _diagnose(self) -> None:
-        array = convert.status_diagnostics(self._status, self.get_name(), self._header())
-        array.status.append(self._the_operator.health(self.get_name()))
+        name = self.get_fully_qualified_name()
+        array = convert.status_diagnostics(self._status, name, self._header())
+        array.status.append(self._the_operator.health(name))
         self._diagnostics_topic.publish(array)
 
     def _on_episode(self, info: EpisodeInfo) -> None:
-        """A finished episode of our cell is checked, and joins what the next calibration without named bags reads."""
-        ours = info.cell == self._cell_name
-        if self.active and info.state == EpisodeInfo.FINISHED and ours and info.bag not in self._recorded:
+        """A finished episode of our cell is checked, and joins what the next calibration without named bags reads.
+
+        One that is discarded afterwards leaves both again.
+        """
+        if not self.active or info.cell != self._cell_name:
+            return
+        if info.state == EpisodeInfo.FINISHED and info.bag not in self._recorded:
             self._recorded.append(info.bag)
             self._the_operator.take(info.bag)
+        elif info.state == EpisodeInfo.DISCARDED and info.bag in self._recorded:
+            self._recorded.remove(info.bag)
+            self._the_operator.drop(info.bag)
 
     def _on_start(self) -> None:
         """Once, as soon as our own action server is there."""
         if not self._own_client.server_is_ready():
             return
         self._start_timer.cancel()
-        self._own_client.send_goal_async(self._first_goal)
+        try:
+            self._begin_own(self._first_goal)
+        except CompassError as error:
+            self._refuse(error)
 
     def _end_job(self) -> None:
         """End a running calibration and wait until nothing of it is left."""
@@ -317,14 +289,16 @@ class Calibrator(ManagedNode):
 
     def _on_recalibrate(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
-            self._refuse_a_second()
-            request = self._request(Calibrate.Goal())
+            request = self._begin_own(Calibrate.Goal())
         except CompassError as error:
-            response.message = str(error)
+            response.message = self._refuse(error)
             return response
-        self._own_client.send_goal_async(Calibrate.Goal())
-        response.success, response.message = True, f"calibrating from {len(request.bags)} bags"
+        response.success, response.message = True, f"calibrating from {len(request.bags)} bags, or folders of bags"
         return response
+
+
+def _without_result(message: str) -> Calibrate.Result:
+    return Calibrate.Result(success=False, message=message, gap_nominal=math.nan, gap_calibrated=math.nan)
 
 
 def main() -> None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from statistics import fmean
 from typing import Any
 
+from compass_ros_interfaces.action import Calibrate
 from compass_ros_interfaces.msg import (
     CalibrationStatus,
     CausalGraph,
@@ -20,6 +21,7 @@ from compass_ros_interfaces.msg import (
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_msgs.msg import Header
 
+from compass_ros.cells import Cell
 from compass_ros.nodes.diagnostic import diagnostic
 from compass_ros.nodes.job import Step
 
@@ -135,11 +137,22 @@ def mean_gap(result: Json, model: str) -> float:
     return fmean(number(value) for value in found["d"].values()) if found else math.nan
 
 
+def left_out(result: Json) -> list[str]:
+    """Recordings that a calibration could not use, each with the reason; results of version 0.1 know of none."""
+    return [f"{one['bag']} was left out: {one['reason']}" for one in result["episodes"].get("left_out", ())]
+
+
+def frame_of(cell: Cell, frame: str) -> str:
+    """The frame of positions in the cell: the given one; none where it tracks joints alone."""
+    return frame if any(spec.quantity != "joint" for spec in cell.objects) else ""
+
+
 def status_message(
-    state: int, header: Header, unit: str, step: Step | None = None, message: str = ""
+    state: int, unit: str, step: Step | None = None, message: str = "", left_out: Sequence[str] = ()
 ) -> CalibrationStatus:
-    """What the calibrator does now; `step` while it runs; `unit` of the gap."""
-    status = CalibrationStatus(header=header, state=state, unit=unit, message=message)
+    """What the calibrator does now; `step` while it runs; `unit` of the gap. The header is not filled in."""
+    status = CalibrationStatus(state=state, unit=unit, message=message, left_out=list(left_out))
+    status.share_done = float(state == CalibrationStatus.SUCCEEDED)
     status.gap = status.sparsity = status.seconds_left = math.nan
     if step is not None:
         status.stage = step.progress.stage
@@ -149,6 +162,19 @@ def status_message(
         status.share_done = step.progress.done
         status.seconds_left = step.seconds_left
     return status
+
+
+def feedback_message(status: CalibrationStatus) -> Calibrate.Feedback:
+    """The same for whoever has asked for the calibration."""
+    return Calibrate.Feedback(
+        iteration=status.iteration,
+        gap=status.gap,
+        unit=status.unit,
+        sparsity=status.sparsity,
+        share_done=status.share_done,
+        seconds_left=status.seconds_left,
+        stage=status.stage,
+    )
 
 
 WORDS = {
@@ -164,6 +190,8 @@ WORDS = {
 def status_diagnostics(status: CalibrationStatus, node: str, header: Header) -> DiagnosticArray:
     """The same for /diagnostics."""
     level, word = WORDS[status.state]
+    if status.problems or status.left_out:
+        level = max(level, DiagnosticStatus.WARN)
     values = {
         "stage": status.stage,
         "iteration": str(status.iteration),
@@ -172,5 +200,5 @@ def status_diagnostics(status: CalibrationStatus, node: str, header: Header) -> 
         "share done": f"{status.share_done:.3f}",
         "seconds left": f"{status.seconds_left:.0f}",
     }
-    message = f"{word}: {status.message}" if status.message else word
+    message = "; ".join((f"{word}: {status.message}" if status.message else word, *status.problems, *status.left_out))
     return DiagnosticArray(header=header, status=[diagnostic(f"{node}: calibration", level, message, values)])

@@ -8,8 +8,17 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
-from geometry_msgs.msg import Point, Pose, PoseWithCovarianceStamped, Quaternion, Vector3
+from geometry_msgs.msg import (
+    Point,
+    Pose,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Vector3,
+)
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
@@ -17,10 +26,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 from compass_ros.tracking.camera import CameraModel, camera_model
 from compass_ros.tracking.config import TrackerConfig
 from compass_ros.tracking.encoding import bgr_from_bytes
+from compass_ros.tracking.frames import Place
 from compass_ros.tracking.tracker import Sighting
 from compass_ros.types import Floats
 
-FRAME = "table"
 _SECOND_NS = 1_000_000_000
 _UNKNOWN_YAW_VARIANCE = math.pi**2 / 3
 """A round object shows no yaw: uniform over the circle [rad^2]."""
@@ -66,9 +75,26 @@ def camera_info_message(camera: CameraModel, head: Header) -> CameraInfo:
     )  # fmt: skip
 
 
-def pose_message(sighting: Sighting) -> PoseWithCovarianceStamped:
-    """Position on the table's surface; the orientation is the identity, with a yaw that is stated as not known."""
-    message = PoseWithCovarianceStamped(header=header(sighting.stamp_ns, FRAME))
+def transform_message(place: Place, parent: str, child: str, at: Time) -> TransformStamped:
+    """Where the frame `child` is in `parent`."""
+    x, y, z, w = Rotation.from_matrix(place.rotation).as_quat().tolist()
+    px, py, pz = place.translation.tolist()
+    transform = Transform(translation=Vector3(x=px, y=py, z=pz), rotation=Quaternion(x=x, y=y, z=z, w=w))
+    return TransformStamped(header=Header(stamp=at, frame_id=parent), child_frame_id=child, transform=transform)
+
+
+def place_of(transform: Transform) -> Place:
+    """An orientation of zeros, which is none, counts as the identity."""
+    p, q = transform.translation, transform.rotation
+    numbers = [q.x, q.y, q.z, q.w]
+    rotation = Rotation.from_quat(numbers).as_matrix() if any(numbers) else np.eye(3)
+    return Place(rotation, np.array([p.x, p.y, p.z]))
+
+
+def pose_message(sighting: Sighting, frame: str) -> PoseWithCovarianceStamped:
+    """Position on the table's surface, in the table's frame; the orientation is the identity, with a yaw that is stated
+    as not known."""
+    message = PoseWithCovarianceStamped(header=header(sighting.stamp_ns, frame))
     x, y = sighting.xy.tolist()
     message.pose.pose = Pose(position=Point(x=x, y=y), orientation=Quaternion(w=1.0))
     covariance = np.zeros((6, 6))
@@ -78,15 +104,15 @@ def pose_message(sighting: Sighting) -> PoseWithCovarianceStamped:
     return message
 
 
-def markers_message(sightings: Iterable[Sighting], config: TrackerConfig, at_ns: int) -> MarkerArray:
-    """Discs in their colours, pale where predicted; each vanishes when it is not renewed."""
+def markers_message(sightings: Iterable[Sighting], config: TrackerConfig, head: Header) -> MarkerArray:
+    """Discs in the frame of `head` in their colours, pale where predicted; each vanishes when it is not renewed."""
     markers = []
     for number, sighting in enumerate(sightings):
         look = config.objects[sighting.object]
         x, y = sighting.xy.tolist()
         markers.append(
             Marker(
-                header=header(at_ns, FRAME),
+                header=head,
                 ns=sighting.object,
                 id=number,
                 type=Marker.CYLINDER,

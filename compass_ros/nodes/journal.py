@@ -11,6 +11,7 @@ import json
 import os
 import shutil
 import signal
+import time
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -131,13 +132,23 @@ def _read(path: Path) -> dict[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
+def _command_line(process: int) -> bytes:
+    """Of a running process; a program that is just being loaded has none for a moment. Raises OSError."""
+    for _ in range(100):
+        words = Path(f"/proc/{process}/cmdline").read_bytes()
+        if words or "\nState:\tZ" in Path(f"/proc/{process}/status").read_text(encoding="utf-8"):
+            break
+        time.sleep(0.01)
+    return words
+
+
 def _tidy(content: Mapping[str, Any]) -> None:
     """End the orphan of a killed node, if it still runs, and remove its unfinished files."""
     process, folder = content.get("process"), content.get("folder")
     if not isinstance(process, int) or not isinstance(folder, str) or not folder:
         return
     with suppress(OSError):
-        if folder.encode() in Path(f"/proc/{process}/cmdline").read_bytes():
+        if folder.encode() in _command_line(process):
             os.killpg(process, signal.SIGKILL)
     if Path(folder).name.startswith(".") and Path(folder).parent == Path(str(content.get("output"))).parent:
         shutil.rmtree(folder, ignore_errors=True)

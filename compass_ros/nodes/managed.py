@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import NameValidationException
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
+from rclpy.timer import Timer
 
 from compass_ros.errors import CompassError
+from compass_ros.nodes.alarms import Alarms
+from compass_ros.nodes.requests import one_line, wrong_text
+from compass_ros.nodes.surroundings import Surroundings
+from compass_ros.places import data_home, placed
 
 AUTOSTART = "autostart"
 _START = "configure and activate by itself; false: wait for a lifecycle manager, or `ros2 lifecycle set`"
 _TO_BE_CONFIGURED = frozenset({"unconfigured", "configuring"})
+GRACE_S = 1.0
+"""[s] Not so soon after the node has come to life or was activated: it finds the others one after the other."""
+LOOK_S = 0.5
+"""[s] How often a node looks for what is wrong with it and around it."""
+Check = Callable[[Any], str]
+"""Of a parameter's value: what is wrong with it, or nothing."""
 
 
 class ManagedNode(LifecycleNode):
@@ -29,9 +44,14 @@ class ManagedNode(LifecycleNode):
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self.active = False
+        self._changed_s = time.monotonic()
         self._fixed: set[str] = set()
+        self._checks: dict[str, Check] = {}
         self.declare_parameter(AUTOSTART, True, ParameterDescriptor(description=_START))
-        self.add_on_set_parameters_callback(self._keep_fixed)
+        self.add_on_set_parameters_callback(self._checked)
+        self._surroundings = Surroundings(self)
+        self._said = Alarms(self.get_logger())
+        self.every(LOOK_S, self._look)
         self._failure: CompassError | None = None
         self._before = {id(one) for one in self._entities()}
         for service in self.services:
@@ -50,14 +70,39 @@ class ManagedNode(LifecycleNode):
     def cleanup(self) -> None:
         """Let go of what is not ROS's: files, threads. Called also when `configure` has failed half-way."""
 
-    def declare_fixed(self, name: str, default: object, text: str, **extra: object) -> None:
+    def problems(self) -> list[str]:
+        """What is wrong now, one sentence each. A node adds what it knows, and shows all where an operator looks."""
+        return self._surroundings.problems()
+
+    def tell(self) -> None:
+        """Something has begun to be wrong, or is right again; the log has it already. A node with a status shows it."""
+
+    def every(self, period_s: float, work: Callable[[], None]) -> Timer:
+        """A timer that goes on where a simulated clock stands still."""
+        return self.create_timer(period_s, work, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def declare_fixed(self, name: str, default: object, text: str, check: Check | None = None, **extra: object) -> None:
         """A parameter that may change only while the node is not configured."""
         self._fixed.add(name)
-        self.declare_described(name, default, text, **extra)
+        self.declare_described(name, default, text, check, **extra)
 
-    def declare_described(self, name: str, default: object, text: str, **extra: object) -> None:
-        """A parameter that may change at any time; `extra`: further fields of its descriptor."""
+    def declare_described(
+        self, name: str, default: object, text: str, check: Check | None = None, **extra: object
+    ) -> None:
+        """A parameter that may change at any time, to a value that passes `check`; `extra`: more of its descriptor."""
+        if check is not None:
+            self._checks[name] = check
         self.declare_parameter(name, default, ParameterDescriptor(description=text, **extra))
+
+    def declare_data_dir(self) -> None:
+        """The folder of all that a node writes, where no parameter names another one."""
+        text = "folder of all that this node writes; empty: compass_ros in $ROS_HOME, else in $XDG_DATA_HOME, else in "
+        self.declare_fixed("data_dir", "", text + "~/.local/share", wrong_text)
+
+    def place(self, parameter: str, name: str = "") -> Path:
+        """The absolute folder that a parameter names; where it is empty, `name` (or the parameter's) in data_dir."""
+        home = placed(self.get_parameter("data_dir").value, data_home())
+        return placed(self.get_parameter(parameter).value, home / (name or parameter))
 
     def start(self) -> None:
         """Configure and activate, where `autostart` says so. Raises CompassError."""
@@ -84,7 +129,7 @@ class ManagedNode(LifecycleNode):
         return done
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self.active = True
+        self.active, self._changed_s = True, time.monotonic()
         done = self._do(self.activate)
         self.active = done is TransitionCallbackReturn.SUCCESS
         return super().on_activate(state) if self.active else done
@@ -118,9 +163,9 @@ class ManagedNode(LifecycleNode):
         self._failure = None
         try:
             work()
-        except CompassError as error:
-            self._failure = error
-            self.get_logger().error(str(error))
+        except (CompassError, NameValidationException) as error:
+            self._failure = CompassError(one_line(str(error)))
+            self.get_logger().error(str(self._failure))
             return TransitionCallbackReturn.FAILURE
         return TransitionCallbackReturn.SUCCESS
 
@@ -144,7 +189,17 @@ class ManagedNode(LifecycleNode):
     def _entities(self) -> list[object]:
         return [*self.timers, *self.subscriptions, *self.services, *self.clients, *self.publishers]
 
-    def _keep_fixed(self, changes: list[Parameter]) -> SetParametersResult:
+    def _look(self) -> None:
+        if time.monotonic() - self._changed_s < GRACE_S:
+            return
+        if self._said.take(self.problems()):
+            self.tell()
+
+    def _checked(self, changes: list[Parameter]) -> SetParametersResult:
+        for change in changes:
+            wrong = self._checks[change.name](change.value) if change.name in self._checks else ""
+            if wrong:
+                return SetParametersResult(successful=False, reason=f"{change.name}: {wrong}")
         late = [change.name for change in changes if change.name in self._fixed]
         if late and self.state not in _TO_BE_CONFIGURED:
             reason = f"{late[0]} can be changed only while the node is not configured, it is {self.state}"

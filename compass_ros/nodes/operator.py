@@ -34,11 +34,13 @@ CELL_SIZE_M = 0.02
 class Operator:
     """Services and topics of a configured calibrator. Entities belong to the node; `close` ends the thread."""
 
-    def __init__(self, node: Node, desk: Desk, checking: bool) -> None:
-        """`checking`: compare each new episode with the simulator in force."""
+    def __init__(self, node: Node, desk: Desk, checking: bool, unit: str, frame: str) -> None:
+        """`checking`: compare new episodes with the simulator in force; `unit` of their gaps, `frame` of positions."""
         self._node = node
         self._desk = desk
         self._checking = checking
+        self._unit = unit
+        self._frame = frame
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="operator")
         self._verdict: Verdict | None = None
         self._problem = ""
@@ -68,6 +70,11 @@ class Operator:
         if self._checking:
             self._later(lambda: self._desk.take(Path(bag)))
 
+    def drop(self, bag: str) -> None:
+        """An episode of this cell was discarded after its end."""
+        if self._checking:
+            self._later(lambda: self._desk.drop(Path(bag)))
+
     def health(self, name: str) -> DiagnosticStatus:
         """For /diagnostics: what is in force, what is proposed, how the check stands."""
         try:
@@ -82,7 +89,7 @@ class Operator:
         if verdict is not None:
             values |= {
                 "episodes checked": str(verdict.episodes),
-                "gap of the newest [m]": f"{verdict.newest_gap_m:.5f}",
+                f"gap of the newest [{self._unit}]": f"{verdict.newest_gap:.5f}",
                 "evidence that the gap has grown": f"{verdict.e_value:.3g}",
             }
             message = verdict.sentence
@@ -157,6 +164,8 @@ class Operator:
         self._worker.submit(watched).add_done_callback(_raise)
 
     def _show(self) -> None:
+        if not any(spec.quantity != "joint" for spec in self._desk.cell.objects):
+            return  # joints have no place
         result = read_result(self._desk.result / "result.json")
         residuals = self._desk.residuals()
         floor_m = result["gap"]["noise_floor_m"] or 0.0
@@ -165,7 +174,7 @@ class Operator:
         self._markers_topic.publish(markers_message(residuals, result["mismatch"], self._header()))
 
     def _header(self) -> Header:
-        return Header(stamp=self._node.get_clock().now().to_msg(), frame_id="table")
+        return Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self._frame)
 
 
 def _raise(done: Future[None]) -> None:

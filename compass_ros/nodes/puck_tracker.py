@@ -22,7 +22,10 @@ from visualization_msgs.msg import MarkerArray
 
 from compass_ros.errors import CompassError
 from compass_ros.nodes import images
+from compass_ros.nodes.camera_frame import CameraFrame
 from compass_ros.nodes.managed import ManagedNode
+from compass_ros.nodes.qos import RELIABLE
+from compass_ros.nodes.requests import wrong_text
 from compass_ros.nodes.run import run
 from compass_ros.nodes.tracker_health import Counts, StampGaps, health_message
 from compass_ros.nodes.tracker_parameters import declare_tracker, tracker_of
@@ -35,7 +38,6 @@ SENSOR_IN = QoSProfile(depth=30, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Half a second of images may wait while the machine is busy elsewhere; none is lost before."""
 DEBUG_EVERY = 4
 """One image in this many is annotated."""
-WATCH_PERIOD_S = 0.25
 DIAGNOSTICS_PERIOD_S = 1.0
 
 
@@ -48,6 +50,9 @@ class PuckTracker(ManagedNode):
         self._camera_timeout_s = self._limit("camera_timeout_s", 0.5, "the camera has stopped after this [s]", 60.0)
         self._moved_m = self._limit("moved_m", 0.002, "a table that is farther from its place has moved [m]", 1.0)
         self._lost_s = self._limit("lost_s", 2.0, "an object that is not seen for longer is lost [s]", 3600.0)
+        self.declare_fixed("frame", "table", "frame of the poses: origin at the centre of the table, z up", wrong_text)
+        tf = "hang the camera's frame (the root of its tree) below `frame` in TF, where the fiducials place it"
+        self.declare_fixed("publish_tf", True, tf)
         self._forget()
         self.add_on_set_parameters_callback(self._on_parameters)
 
@@ -61,25 +66,26 @@ class PuckTracker(ManagedNode):
         self._watch = Watch()
         self._camera: CameraModel | None = None
         self._problem = "no image yet"
-        self._warned: set[str] = set()
         self._counts = Counts()
         self._gaps = StampGaps()
+        self._image_frame = ""
         self._heard_s = self._diagnosed_s = time.monotonic()
 
     def configure(self) -> None:
         self._forget()
+        self._frame = str(self.get_parameter("frame").value)
+        self._camera_frame = CameraFrame(self, self._frame) if self.get_parameter("publish_tf").value else None
         self._poses = {
-            name: self.create_publisher(PoseWithCovarianceStamped, f"~/{name}/pose", qos_profile_sensor_data)
+            name: self.create_publisher(PoseWithCovarianceStamped, f"~/{name}/pose", RELIABLE)
             for name in self._config.objects
         }
         self._markers = self.create_publisher(MarkerArray, "~/markers", 10)
-        self._debug = self.create_publisher(Image, "~/debug_image", qos_profile_sensor_data)
+        self._debug = self.create_publisher(Image, "~/debug_image", RELIABLE)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.create_subscription(CameraInfo, "camera_info", self._on_camera, qos_profile_sensor_data)
         self.create_subscription(Image, "image", self._on_image, SENSOR_IN)
         self.create_service(Trigger, "~/accept_table", self._on_accept)
-        self.create_timer(WATCH_PERIOD_S, self._on_watch)
-        self.create_timer(DIAGNOSTICS_PERIOD_S, self._diagnose)
+        self.every(DIAGNOSTICS_PERIOD_S, self._diagnose)
 
     def activate(self) -> None:
         self._heard_s = time.monotonic()
@@ -109,6 +115,7 @@ class PuckTracker(ManagedNode):
             return
         started = time.perf_counter()
         self._heard_s = time.monotonic()
+        self._image_frame = message.header.frame_id
         stamp_ns = images.stamp_ns(message.header.stamp)
         self._counts.images += 1
         self._counts.missed += self._gaps.take(stamp_ns)
@@ -134,9 +141,10 @@ class PuckTracker(ManagedNode):
 
     def _publish(self, frame: Frame) -> None:
         for sighting in frame.sightings:
-            self._poses[sighting.object].publish(images.pose_message(sighting))
+            self._poses[sighting.object].publish(images.pose_message(sighting, self._frame))
         if self._markers.get_subscription_count():
-            self._markers.publish(images.markers_message(frame.sightings, self._config, frame.stamp_ns))
+            head = images.header(frame.stamp_ns, self._frame)
+            self._markers.publish(images.markers_message(frame.sightings, self._config, head))
 
     def _complain(self, problem: str) -> None:
         """Say a problem once, when it begins; count the images that it costs."""
@@ -149,23 +157,17 @@ class PuckTracker(ManagedNode):
                 self.get_logger().info(f"table found, reprojection error {self._state.fix.residual_px:.2f} px")
         self._problem = problem
 
-    def _alarms(self) -> list[str]:
-        """What the watchdog says now."""
-        silent_s = time.monotonic() - self._heard_s
-        if silent_s > self._camera_timeout_s:
-            return [f"the camera has stopped: no images for {silent_s:.1f} s"]
-        return list(complaints(self._watch, self._config.objects, self._moved_m, self._lost_s))
-
-    def _on_watch(self) -> None:
-        """Say each alarm once, when it begins."""
-        alarms = {alarm.split(":", maxsplit=1)[0].split(" by ")[0]: alarm for alarm in self._alarms()}
+    def problems(self) -> list[str]:
+        """What the watchdog says now, too."""
+        said = super().problems()
         if not self.active:
-            return
-        for kind in alarms.keys() - self._warned:
-            self.get_logger().warning(alarms[kind])
-        for kind in self._warned - alarms.keys():
-            self.get_logger().info(f"over: {kind}")
-        self._warned = set(alarms)
+            return said
+        topics = ["image", *(["camera_info"] if self._camera is None else [])]
+        deaf = [f"{self.resolve_topic_name(t)} has no publisher" for t in topics if not self.count_publishers(t)]
+        silent_s = time.monotonic() - self._heard_s
+        if not deaf and silent_s > self._camera_timeout_s:
+            deaf = [f"the camera has stopped: no images for {silent_s:.1f} s"]
+        return [*said, *(deaf or complaints(self._watch, self._config.objects, self._moved_m, self._lost_s))]
 
     def _on_accept(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         moved_mm = 1e3 * self._watch.moved_m
@@ -178,13 +180,14 @@ class PuckTracker(ManagedNode):
         counts, self._counts = self._counts, Counts()
         now_s = time.monotonic()
         seconds, self._diagnosed_s = now_s - self._diagnosed_s, now_s
-        if self.active:
-            problems = [*self._alarms(), *filter(None, [self._problem])]
-        else:
-            problems = [f"not active, but {self.state}"]
+        own = self._problem if self.active else f"not active, but {self.state}"
+        problems = [*self.problems(), *filter(None, [own])]
         residual_px = self._state.fix.residual_px
-        status = health_message(self.get_name(), counts, seconds, residual_px, self._config.objects, problems)
+        name = self.get_fully_qualified_name()
+        status = health_message(name, counts, seconds, residual_px, self._config.objects, problems)
         head = images.header(self.get_clock().now().nanoseconds, "")
+        if self._camera_frame is not None and self._state.fix.view is not None:
+            self._camera_frame.place(self._image_frame, self._state.fix.view, head.stamp)
         self._diagnostics.publish(DiagnosticArray(header=head, status=[status]))
 
 

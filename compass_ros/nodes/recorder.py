@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 from compass_ros_interfaces.msg import EpisodeInfo
 from compass_ros_interfaces.srv import StartEpisode, StopEpisode
 from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import IntegerRange
+from rclpy.exceptions import NameValidationException
+from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_srvs.srv import Trigger
 
 from compass_ros.episodes.recording import Recorder
@@ -16,7 +21,7 @@ from compass_ros.errors import BagError
 from compass_ros.nodes.managed import ManagedNode
 from compass_ros.nodes.qos import LATCHED
 from compass_ros.nodes.recorder_messages import episode_message, health_message
-from compass_ros.nodes.requests import checked_action, checked_text
+from compass_ros.nodes.requests import checked_action, checked_text, one_line, wrong_text
 from compass_ros.nodes.run import run
 from compass_ros.nodes.topic_watch import TopicWatch
 
@@ -40,23 +45,27 @@ class RecorderNode(ManagedNode):
 
     def _declare(self) -> None:
         declare = self.declare_fixed
-        declare(
-            "topics",
-            DEFAULT_TOPICS,
-            "names of the topics to record, of any type; relative ones are in the namespace and can be remapped, and "
-            "the bag has them under the name that is given here, from the root",
-        )
-        declare("directory", "out/episodes", "folder of the bags; this node holds it alone")
-        declare("depth", 1000, "messages of a topic that wait here when the disk is slow [count]")
-        declare("min_free_mb", 500, "an episode is not started with less on the disk [MB]")
-        declare("max_duration_s", 600, "an episode that nobody stops is ended after this [s]; 0: never")
-        declare("cell", "", "name of the cell, where the start service does not say it")
-        declare("cell_hash", "", "hash of the cell's configuration, where the start service does not say it")
+        topics = "names of the topics to record, of any type; relative ones are in the namespace and can be remapped, "
+        topics += "and the bag has them under the name that is given here, from the root"
+        declare("topics", DEFAULT_TOPICS, topics, self._wrong_topics)
+        self.declare_data_dir()
+        folder = "folder of the bags; this node holds it alone; empty: `episodes` in data_dir"
+        declare("directory", "", folder, wrong_text)
+
+        def whole(name: str, default: int, text: str, least: int, most: int) -> None:
+            declare(name, default, text, integer_range=[IntegerRange(from_value=least, to_value=most, step=1)])
+
+        whole("depth", 1000, "messages of a topic that wait here when the disk is slow [count]", 1, 1_000_000)
+        whole("min_free_mb", 500, "an episode is not started with less on the disk [MB]", 0, 10**9)
+        whole("max_duration_s", 600, "an episode that nobody stops is ended after this [s]; 0: never", 0, 10**8)
+        declare("cell", "", "name of the cell, where the start service does not say it", wrong_text)
+        hashed = "hash of the cell's configuration, where the start service does not say it"
+        declare("cell_hash", "", hashed, wrong_text)
 
     def configure(self) -> None:
         """Raises BagError: the folder cannot be written, or another recorder holds it."""
         self._recorder = Recorder(
-            Path(self._text("directory")).expanduser(),
+            self.place("directory", "episodes"),
             min_free_bytes=self._whole("min_free_mb") * 10**6,
             max_duration_ns=self._whole("max_duration_s") * 10**9,
         )
@@ -74,8 +83,8 @@ class RecorderNode(ManagedNode):
             received=self._on_message,
         )
         self._received = 0
-        self.create_timer(DISCOVERY_PERIOD_S, self._on_discovery)
-        self.create_timer(STATUS_PERIOD_S, self._on_tick)
+        self.every(DISCOVERY_PERIOD_S, self._on_discovery)
+        self.every(STATUS_PERIOD_S, self._on_tick)
         if self._recorder.status.message:
             self.get_logger().warning(self._recorder.status.message)
 
@@ -83,6 +92,13 @@ class RecorderNode(ManagedNode):
         """Raises BagError while an episode runs."""
         if self._running.recording:
             raise BagError(f"episode {self._running.status.episode} is being recorded; stop or discard it first")
+
+    def problems(self) -> list[str]:
+        return [*super().problems(), *(self._watch.problems() if self.active else ()), *self._scarcity()]
+
+    def tell(self) -> None:
+        if self._recorder is not None:
+            self._say()
 
     def cleanup(self) -> None:
         if self._recorder is not None:
@@ -104,6 +120,26 @@ class RecorderNode(ManagedNode):
 
     def _now_ns(self) -> int:
         return int(self.get_clock().now().nanoseconds)
+
+    def _scarcity(self) -> list[str]:
+        """What is wrong with the folder."""
+        if self._recorder is None:
+            return []
+        try:
+            free, asked = self._recorder.free_bytes() // 10**6, self._whole("min_free_mb")
+        except BagError as error:
+            return [str(error)]
+        return [f"{free} MB left on the disk, {asked} MB are asked for"] if free < asked else []
+
+    def _wrong_topics(self, topics: Sequence[str]) -> str:
+        if not topics:
+            return "expected one topic or more, found none"
+        for topic in topics:
+            try:
+                validate_full_topic_name(self.resolve_topic_name(topic))
+            except NameValidationException as error:
+                return one_line(str(error))
+        return ""
 
     def _on_discovery(self) -> None:
         if self.active:
@@ -135,7 +171,9 @@ class RecorderNode(ManagedNode):
     def _on_stop(self, request: StopEpisode.Request, response: StopEpisode.Response) -> StopEpisode.Response:
         del request  # empty
         try:
-            status = self._running.stop()
+            status = self._running.stop(now_ns=self._now_ns())
+            if status.message:
+                self.get_logger().warning(f"{status.episode}: {status.message}")
             response.success, response.message = True, status.message
             self._say()
             self._syncing.submit(sync_bag, Path(status.bag))
@@ -157,7 +195,7 @@ class RecorderNode(ManagedNode):
     def _on_tick(self) -> None:
         if self._running.overdue(self._now_ns()):
             try:
-                self._running.stop(f"ended by itself after {self._whole('max_duration_s')} s")
+                self._running.stop(f"ended by itself after {self._whole('max_duration_s')} s", self._now_ns())
             except BagError as error:
                 self.get_logger().error(str(error))
             self._say()
@@ -166,11 +204,10 @@ class RecorderNode(ManagedNode):
         self._diagnose()
 
     def _say(self) -> None:
-        self._status_topic.publish(episode_message(self._running.progress()))
+        self._status_topic.publish(episode_message(self._running.progress(), self.problems()))
 
     def _diagnose(self) -> None:
-        status = self._running.progress()
-        problems = list(self._watch.problems())
+        status, problems = self._running.progress(), self.problems()
         values = {
             "state": status.state,
             "episode": status.episode,
@@ -179,12 +216,8 @@ class RecorderNode(ManagedNode):
             **self._running.counts(),
         }
         self._received = 0
-        try:
-            values["free on disk [MB]"] = free = self._running.free_bytes() // 10**6
-            if free < self._whole("min_free_mb"):
-                problems.append(f"{free} MB left on the disk, {self._whole('min_free_mb')} MB are asked for")
-        except BagError as error:
-            problems.append(str(error))
+        with suppress(BagError):  # `problems` has said so
+            values["free on disk [MB]"] = self._running.free_bytes() // 10**6
         report = health_message(self.get_fully_qualified_name(), status, values, problems)
         stamped = DiagnosticArray(status=[report])
         stamped.header.stamp = self.get_clock().now().to_msg()

@@ -12,7 +12,8 @@ from compass_ros.episodes.notes import STATES, EpisodeHeader
 from compass_ros.nodes.diagnostic import diagnostic
 
 
-def episode_message(status: EpisodeHeader) -> EpisodeInfo:
+def episode_message(status: EpisodeHeader, problems: Sequence[str] = ()) -> EpisodeInfo:
+    """`problems`: what is wrong now, one sentence each; joins what is said of the episode."""
     message = EpisodeInfo(
         state=STATES.index(status.state),
         episode=status.episode,
@@ -21,9 +22,8 @@ def episode_message(status: EpisodeHeader) -> EpisodeInfo:
         bag=status.bag,
         messages=status.messages,
         topics=list(status.topics),
-        message=status.message,
+        message="; ".join(filter(None, [status.message, *(p for p in problems if p not in status.message)])),
     )
-    message.header.frame_id = "table"
     message.header.stamp = Time(sec=status.start_ns // 10**9, nanosec=status.start_ns % 10**9)
     message.duration = Duration(sec=status.duration_ns // 10**9, nanosec=status.duration_ns % 10**9)
     return message

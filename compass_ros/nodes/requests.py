@@ -20,9 +20,10 @@ MOST_PATHS = 1_000_000
 
 
 def one_line(text: str, most: int = 500) -> str:
-    """A message for people: no line breaks, no control characters, not endless."""
-    plain = " ".join("".join(c if c.isprintable() else " " for c in text[: 2 * most]).split())
-    return plain if len(plain) <= most else plain[: most - 3] + "..."
+    """A message for people: no line breaks, no control characters, not endless; what is too long loses its middle."""
+    plain = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    kept = (most - 5) // 2
+    return plain if len(plain) <= most else f"{plain[:kept]} ... {plain[-kept:]}"
 
 
 def checked_action(request: StartEpisode.Request) -> dict[str, float]:
@@ -47,6 +48,11 @@ def checked_text(text: str, what: str) -> str:
     return text
 
 
+def wrong_text(value: str) -> str:
+    """What is wrong with a parameter that is a name or a path, or nothing."""
+    return "" if value.isprintable() else f"expected printable letters, found {one_line(value, 60)!r}"
+
+
 def checked_paths(goal: Calibrate.Goal) -> None:
     """Paths that a command line takes. Raises ConfigError in one line."""
     paths: Sequence[str] = [*goal.bags, goal.cell, goal.output]
@@ -62,9 +68,12 @@ def checked_paths(goal: Calibrate.Goal) -> None:
 
 
 def checked_output(wanted: str, own: Path) -> Path:
-    """Where a result may go: into the folder that holds the node's own output. Raises ConfigError in one line."""
-    home = own.expanduser().absolute().parent.resolve()
-    output = Path(wanted).expanduser().absolute() if wanted else own.expanduser().absolute()
+    """Where a result may go: into the folder that holds the node's `own` output, an absolute path.
+
+    Raises ConfigError in one line.
+    """
+    home = own.parent.resolve()
+    output = Path(wanted).expanduser().absolute() if wanted else own
     if wanted and not output.resolve().is_relative_to(home):
         raise ConfigError(f"output: expected a folder in {home}, where the parameter `output` lies; found {wanted}")
     return output

@@ -9,9 +9,9 @@ answer.
 from __future__ import annotations
 
 import json
-import sys
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +19,8 @@ import rclpy
 from compass_ros_interfaces.msg import ShotCommand
 from compass_ros_interfaces.srv import StartEpisode, StopEpisode
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.client import Client
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from std_srvs.srv import Trigger
@@ -30,6 +29,7 @@ from compass_ros.cells import load
 from compass_ros.config import read_yaml
 from compass_ros.errors import CompassError, ConfigError, shown
 from compass_ros.nodes.images import stamp_ns
+from compass_ros.nodes.run import connected
 
 
 class SilenceError(CompassError):
@@ -51,7 +51,7 @@ class Shooter(Node):
         self._command = self.create_publisher(ShotCommand, "virtual_cell/command", 10)
         self.create_subscription(ShotCommand, "virtual_cell/shot", self._begun.append, 10)
         for one in self._cell.objects:
-            topic = one.topic or f"puck_tracker/{one.name}/pose"
+            topic = one.topic.lstrip("/") or f"puck_tracker/{one.name}/pose"  # a cell says it from the root
             self.create_subscription(PoseWithCovarianceStamped, topic, self._on_pose, qos_profile_sensor_data)
         self._start = self.create_client(StartEpisode, "recorder/start_episode")
         self._stop = self.create_client(StopEpisode, "recorder/stop_episode")
@@ -59,13 +59,16 @@ class Shooter(Node):
         self._reveal = self.create_client(Trigger, "virtual_cell/reveal")
 
     def _declare(self) -> None:
-        def declare(name: str, default: object, text: str) -> None:
-            self.declare_parameter(name, default, ParameterDescriptor(description=text, read_only=True))
+        def declare(name: str, default: object, text: str, **ranges: object) -> None:
+            described = ParameterDescriptor(description=text, read_only=True, **ranges)
+            self.declare_parameter(name, default, described)
 
+        seconds = {"floating_point_range": [FloatingPointRange(from_value=0.0, to_value=86_400.0)]}
         declare("cell", "air_hockey", "name of the cell, or path of its YAML")
         declare("shots_file", "", "YAML with the list `shots`, each a mapping from fields of the action to values")
-        declare("pause_s", 0.8, "from the end of a shot to the next, while all is put back, in the sensor's time [s]")
-        declare("timeout_s", 60.0, "an answer that takes longer will not come [s]")
+        pause = "from the end of a shot to the next, while all is put back, in the sensor's time [s]"
+        declare("pause_s", 0.8, pause, **seconds)
+        declare("timeout_s", 60.0, "an answer that takes longer will not come [s]", **seconds)
         declare("reveal", False, "ask the virtual cell for its true parameters and physics when all is played")
 
     def _on_pose(self, pose: PoseWithCovarianceStamped) -> None:
@@ -90,7 +93,7 @@ class Shooter(Node):
             self._until(lambda: bool(self._begun), "the beginning of the shot")
             end_ns = stamp_ns(self._begun[0].header.stamp) + round(self._cell.duration * 1e9)
             self._until(lambda: self._newest_ns >= end_ns, "poses of the whole shot")
-        except SilenceError:
+        except (SilenceError, KeyboardInterrupt):
             self._call(self._discard, Trigger.Request())
             raise
         info = self._call(self._stop, StopEpisode.Request()).info
@@ -134,15 +137,8 @@ def say(**content: object) -> None:
 
 
 def main() -> None:
-    rclpy.init()
-    try:
+    with connected("shooter"), suppress(KeyboardInterrupt):
         Shooter().run()
-    except CompassError as error:
-        sys.exit(f"shooter: {error}")
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        rclpy.try_shutdown()
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib import import_module
@@ -14,6 +15,7 @@ from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from compass_ros.episodes.definitions import Definition, installed_definition
+from compass_ros.episodes.pulse import Pulse
 from compass_ros.episodes.recording import Connection
 from compass_ros.errors import BagError
 
@@ -47,6 +49,7 @@ class TopicWatch:
         self._latching: dict[str, set[tuple[int, ...]]] = {}
         """The publishers seen so far on each topic that is latched."""
         self._problems: dict[str, str] = {}
+        self._pulse = Pulse()
 
     def update(self) -> None:
         """Look at the graph: subscribe to what is new, again to what has changed."""
@@ -54,6 +57,7 @@ class TopicWatch:
             publishers = self._node.get_publishers_info_by_topic(topic)
             self._publishers[topic] = len(publishers)
             if not publishers:
+                self._pulse.forget(topic)
                 self._problems[topic] = f"{topic} has no publisher"
                 continue
             self._problems.pop(topic, None)
@@ -63,8 +67,9 @@ class TopicWatch:
                 self._problems[topic] = f"{topic} is not recorded: {error}"
 
     def problems(self) -> tuple[str, ...]:
-        """What is not received, one sentence each."""
-        return tuple(self._problems.values())
+        """What is not received, or not any more, one sentence each."""
+        silent = self._pulse.stopped(time.monotonic_ns()).items()
+        return (*self._problems.values(), *(f"{topic} has stopped: no message for {s:.1f} s" for topic, s in silent))
 
     def _follow(self, topic: str, publishers: Sequence[TopicEndpointInfo]) -> None:
         """Keep the type that is received as long as anybody publishes it; else take another (the first by name)."""
@@ -104,6 +109,7 @@ class TopicWatch:
         return len(seen)
 
     def _receive(self, topic: str, data: bytes, info: Mapping[str, int | None]) -> None:
+        self._pulse.beat(topic, time.monotonic_ns())
         sequence = info["publication_sequence_number"] if self._publishers[topic] == 1 else None
         self._received(self._topics[topic], data, info["source_timestamp"] or 0, sequence)
 

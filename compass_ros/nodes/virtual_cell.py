@@ -19,7 +19,6 @@ from compass_ros_interfaces.msg import ShotCommand
 from numpy.typing import NDArray
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_srvs.srv import Trigger
 
@@ -28,6 +27,7 @@ from compass_ros.concealed.stage import Secret, Stage, read_secret
 from compass_ros.errors import CompassError, ConfigError
 from compass_ros.nodes import images
 from compass_ros.nodes.play import action_of, hidden_values, play, resting, table_shift
+from compass_ros.nodes.qos import RELIABLE
 from compass_ros.nodes.run import run
 from compass_ros.tracking.arm import arm_pose
 from compass_ros.tracking.scene_config import SceneConfig, scene_config
@@ -53,14 +53,15 @@ class VirtualCell(Node):
         self._camera = make_camera(self._scene, seed, table_shift(self._cell, secret.values))
         self._rest = self._play = resting(self._stage, self._scene)
         self._command: ShotCommand | None = None
+        self._frame = str(self.get_parameter("frame").value)
         self._drawn: NDArray[np.uint8] | None = None
         self._start_ns = self.get_clock().now().nanoseconds
         self._images_taken = 0
         self._image_of_play = 0
 
-        self._images = self.create_publisher(Image, "image", qos_profile_sensor_data)
-        self._infos = self.create_publisher(CameraInfo, "camera_info", qos_profile_sensor_data)
-        self._joints = self.create_publisher(JointState, "~/joint_states", qos_profile_sensor_data)
+        self._images = self.create_publisher(Image, "image", RELIABLE)
+        self._infos = self.create_publisher(CameraInfo, "camera_info", RELIABLE)
+        self._joints = self.create_publisher(JointState, "~/joint_states", RELIABLE)
         self._shots = self.create_publisher(ShotCommand, "~/shot", 10)
         self.create_subscription(ShotCommand, "~/command", self._on_command, 10)
         self.create_service(Trigger, "~/reveal", self._on_reveal)
@@ -85,6 +86,7 @@ class VirtualCell(Node):
         self.declare_parameter("noise", 2.5, describe("standard deviation of the sensor's noise [grey levels]"))
         self.declare_parameter("exposure_s", 0.004, describe("exposure of an image [s]"))
         self.declare_parameter("light", 0.30, describe("share of light that is missing in the darkest corner"))
+        self.declare_parameter("frame", "table", describe("frame of the values of a shot"))
         self.declare_parameter("arm", True, describe("draw the arm that holds the pusher"))
 
     def _read_scene(self) -> SceneConfig:
@@ -120,7 +122,7 @@ class VirtualCell(Node):
         if self._scene.arm is not None:
             angles = arm_pose(self._scene.arm, poses[self._scene.arm.holds][:, :2].mean(axis=0)).joints
             joints = dict(zip(JOINTS, angles.tolist(), strict=True))
-            self._joints.publish(images.joint_message(joints, images.header(now_ns, "table")))
+            self._joints.publish(images.joint_message(joints, images.header(now_ns, "")))
         self._announce(now_ns)
         self._images_taken += 1
         self._image_of_play += 1
@@ -130,7 +132,7 @@ class VirtualCell(Node):
         if self._command is None:
             return
         if self._image_of_play == self._play.begin:
-            shot = ShotCommand(header=images.header(now_ns, "table"), cell=self._cell.name)
+            shot = ShotCommand(header=images.header(now_ns, self._frame), cell=self._cell.name)
             shot.names, shot.values = self._command.names, self._command.values
             self._shots.publish(shot)
         if self._image_of_play >= self._play.length:

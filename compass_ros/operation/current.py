@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,12 +10,13 @@ import numpy as np
 
 from compass_ros.cells import Cell
 from compass_ros.cells.auto import with_auto
-from compass_ros.episodes import Source, default_sources, find_bags, read_episode
+from compass_ros.episodes import Reading, Source, default_sources, find_each, read_each, read_episode
 from compass_ros.episodes.bag import bag_name
 from compass_ros.reporting.result_json import read_result
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects.exported import read_effects
 from compass_ros.simulation.replay import Recordings, Replay, recordings
+from compass_ros.simulation.windows import windows
 from compass_ros.types import Episode, Floats
 
 _ROUNDING = 1e-9
@@ -112,6 +113,18 @@ def read(cell: Cell, bag: Path | str) -> Episode:
     return read_episode(bag, sources(cell), cell.name, cell.hash)
 
 
+def read_usable(cell: Cell, paths: Iterable[Path | str]) -> Reading:
+    """All episodes of the cell that can be compared with its simulator, and why the others cannot.
+
+    Raises BagError where there is none.
+    """
+
+    def compare(episode: Episode) -> object:
+        return recordings(cell, windows(cell, [episode]))
+
+    return read_each(paths, sources(cell), cell.name, cell.hash, compare)
+
+
 def held_out_bags(bags: Sequence[str], names: Sequence[str]) -> tuple[Path, ...]:
     """Those bags among the paths that are named as these episodes are. Raises BagError where there is no bag at all."""
-    return tuple(bag for bag in find_bags(bags) if bag_name(bag) in names)
+    return tuple(bag for bag in find_each(bags).bags if bag_name(bag) in names)

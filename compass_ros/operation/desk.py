@@ -8,9 +8,9 @@ from pathlib import Path
 
 from compass_ros.cells import Cell
 from compass_ros.config import read_yaml
-from compass_ros.episodes import find_bags
+from compass_ros.episodes import find_each
 from compass_ros.errors import BagError, CompassError, ConfigError, DataError
-from compass_ros.operation.current import Current, Residuals, current, held_out_bags, read
+from compass_ros.operation.current import Current, Residuals, current, held_out_bags, read_usable
 from compass_ros.operation.running_check import RunningCheck, Verdict
 from compass_ros.operation.versions import Version, Versions
 from compass_ros.reporting.result_json import read_result
@@ -88,21 +88,25 @@ class Desk:
             raise ConfigError("there is no check")
         return self._check.take(bag)
 
+    def drop(self, bag: Path) -> Verdict:
+        """An episode was discarded after its end: the check goes on without it. Raises CompassError."""
+        if self._check is None:
+            self.renew()
+        if self._check is None:
+            raise ConfigError("there is no check")
+        return self._check.drop(bag)
+
     def residuals(self) -> Residuals:
         """The last calibration against its own recordings, the first few. Simulates.
 
         Raises CompassError where neither can be read.
         """
         found: Current = current(self.cell, self.result, threads=1)
-        episodes = []
-        for bag in find_bags(self._bags(self.result))[:SHOWN]:
-            try:
-                episodes.append(read(self.cell, bag))
-            except BagError:
-                continue  # deleted or damaged since
-        if not episodes:
-            raise DataError("none of the recordings of the last calibration can be read any more")
-        return found.residuals(episodes)
+        try:
+            bags = find_each(self._bags(self.result)).bags[:SHOWN]
+            return found.residuals(read_usable(self.cell, bags).episodes)
+        except BagError as error:
+            raise DataError(f"none of the recordings of the last calibration can be read any more: {error}") from error
 
     def _held_out(self, version: Version) -> Sequence[Path]:
         names = read_result(version.folder / RESULT)["episodes"]["held_out"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,7 +27,8 @@ class Verdict:
     version: int
     episodes: int
     """Since the check began."""
-    newest_gap_m: float
+    newest_gap: float
+    """In the unit of the cell's distances."""
     e_value: float
     alarm: bool
     sentence: str
@@ -74,6 +75,19 @@ class RunningCheck:
         self._keep()
         return self.verdict()
 
+    def drop(self, bag: Path) -> Verdict:
+        """An episode was discarded: the test is what it had been without it.
+
+        Whoever discards has seen the recording and not the test's evidence, so its rate of false alarms stays.
+        """
+        if str(bag) in self._bags:
+            place = self._bags.index(str(bag))
+            gaps = list(self._test.gaps)
+            del gaps[self._test.references + place], self._bags[place]
+            self._test = _replayed(gaps[: self._test.references], gaps[self._test.references :])
+            self._keep()
+        return self.verdict()
+
     def verdict(self) -> Verdict:
         test = self._test
         alarm = test.alarm(self._false_alarm)
@@ -114,6 +128,14 @@ class RunningCheck:
         write_text(self._path, yaml.safe_dump(content, sort_keys=False))
 
 
+def _replayed(reference: Iterable[float], gaps: Iterable[float]) -> GapTest:
+    """Raises DataError for gaps that are none."""
+    test = begin(reference)
+    for gap in gaps:
+        test = observe(test, gap)
+    return test
+
+
 def _restored(path: Path) -> tuple[GapTest, list[str]]:
     """The test replayed from its gaps. Raises ConfigError for a file that is damaged."""
     content = read_yaml(path)
@@ -121,9 +143,7 @@ def _restored(path: Path) -> tuple[GapTest, list[str]]:
         reference, rows = content["reference"], content["episodes"]
         if not isinstance(reference, list) or not isinstance(rows, list):
             raise TypeError("no lists")
-        test = begin(map(float, reference))
-        for row in rows:
-            test = observe(test, float(row["gap_m"]))
+        test = _replayed(map(float, reference), [float(row["gap_m"]) for row in rows])
         return test, [str(row["bag"]) for row in rows]
     except (KeyError, TypeError, ValueError, DataError) as error:
         raise ConfigError(f"{path}: expected gaps of episodes, found something else ({error}); delete it") from error

@@ -62,6 +62,7 @@ def assess(result: Result) -> tuple[Check, ...]:
         *_at_bounds(result),
         *_verdict(result),
         *_effects_predict(result),
+        *(Check("note", "Left out", f"{one.bag}: {one.reason}") for one in result.left_out),
         *(Check("care", "Warning", warning) for warning in result.warnings),
         *_blind_spots(result),
     )

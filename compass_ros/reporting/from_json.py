@@ -16,6 +16,7 @@ from compass_ros.types import (
     Evidence,
     Gap,
     Graph,
+    LeftOut,
     Mismatch,
     ParameterRow,
     Region,
@@ -58,6 +59,7 @@ def from_json(content: Json) -> Result:
         replays=(),
         cancelled=content["cancelled"],
         warnings=tuple(content["warnings"]),
+        left_out=tuple(LeftOut(one["bag"], one["reason"]) for one in content["episodes"].get("left_out", ())),
     )
 
 

@@ -139,7 +139,11 @@ def to_json(result: Result) -> dict[str, Any]:
             "simulated_seconds": _number(result.budget.simulated_seconds),
             "wall_seconds": _number(result.budget.wall_seconds),
         },
-        "episodes": {"fit": list(result.fit), "held_out": list(result.held_out)},
+        "episodes": {
+            "fit": list(result.fit),
+            "held_out": list(result.held_out),
+            "left_out": [{"bag": one.bag, "reason": one.reason} for one in result.left_out],
+        },
         "gap": gap,
         "parameters": [_parameter(row) for row in result.parameters],
         "together": [{"parameters": list(group.parameters), "ratios": group.ratios} for group in result.together],

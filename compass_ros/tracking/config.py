@@ -17,7 +17,7 @@ from compass_ros.config import read_yaml
 from compass_ros.errors import ConfigError, nearest, shown
 
 _strict = ConfigDict(extra="forbid")
-_OF_THE_NODE = frozenset({"object_names", "autostart", "camera_timeout_s", "moved_m", "lost_s"})
+_OF_THE_NODE = frozenset({"object_names", "autostart", "camera_timeout_s", "moved_m", "lost_s", "frame", "publish_tf"})
 """What a parameter file says to the node and not to the tracker."""
 
 

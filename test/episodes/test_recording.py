@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -103,6 +105,72 @@ def test_a_discarded_episode_leaves_nothing(recorder: Recorder) -> None:
     recorder.start("shot", "", "", {}, START_NS)
 
 
+def test_an_episode_is_discarded_after_its_end_once(recorder: Recorder) -> None:
+    for name in ("kept", "last"):
+        recorder.start(name, "", "", {}, START_NS)
+        feed(recorder, range(5))
+        recorder.stop()
+    told = recorder.discard()
+    assert (told.state, told.episode, Path(told.bag).name) == ("discarded", "last", "last")
+    assert sorted(path.name for path in recorder.folder.iterdir()) == [".recorder.lock", "kept"]
+    with pytest.raises(BagError, match="there is no last one to discard"):
+        recorder.discard()
+    recorder.start("last", "", "", {}, START_NS)
+    recorder.stop()
+    shutil.rmtree(recorder.folder / "last")
+    with pytest.raises(BagError, match=r"last: cannot be deleted: No such file"):
+        recorder.discard()
+
+
+@pytest.mark.parametrize(
+    ("action", "connected", "latched", "words"),
+    [
+        ({}, True, 0, "no data: no message came on any of its topics"),
+        ({"x": 0.5}, True, 0, "no data: no message came on any of its topics"),
+        ({}, False, 0, "no data: no message came on any topic, none has a publisher"),
+        ({}, True, 1, "no data: no message came on any of its topics"),
+    ],
+    ids=["nothing", "the shot alone", "no publisher", "latched messages from before"],
+)
+def test_an_episode_without_data_says_so_when_it_stops(
+    tmp_path: Path, action: dict[str, float], connected: bool, latched: int, words: str
+) -> None:
+    recorder = Recorder(tmp_path)
+    if connected:
+        recorder.connect(replace(POSES, latched=latched))
+    if latched:
+        feed(recorder, range(1))
+    recorder.start("shot", "", "", action, START_NS)
+    said = recorder.stop()
+    assert (said.state, said.message) == ("finished", words)
+    assert headers(Path(said.bag))[-1].message == words, "and in the bag"
+    recorder.start("next", "", "", action, START_NS)
+    if connected:
+        feed(recorder, range(1))
+        assert recorder.stop().message == ""
+
+
+def test_a_topic_that_stops_in_the_middle_is_named_with_the_episode(recorder: Recorder) -> None:
+    recorder.start("shot", "", "", {}, START_NS)
+    feed(recorder, range(30))
+    end_ns = START_NS + 29 * STEP_NS
+    assert recorder.stop(now_ns=end_ns + 3_200_000_000).message == f"{TOPIC} stopped 3.2 s before the end"
+    recorder.start("next", "", "", {}, START_NS)
+    feed(recorder, range(30))
+    assert recorder.stop(now_ns=end_ns + 1_000_000_000).message == "", "a person takes a second to stop an episode"
+
+
+@pytest.mark.parametrize("folder", ["bags", "./bags", "../here/bags", "~/bags"])
+def test_what_is_announced_is_absolute(folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    monkeypatch.setenv("HOME", str(tmp_path / "here"))
+    recorder = Recorder(Path(folder))
+    bag = Path(recorder.start("shot", "", "", {}, START_NS).bag)
+    assert bag.is_absolute()
+    assert bag.samefile(tmp_path / "here" / "bags" / "shot")
+
+
 def test_two_recorders_on_one_folder(recorder: Recorder) -> None:
     with pytest.raises(BagError, match=rf"another recorder \(process {os.getpid()}\) records here"):
         Recorder(recorder.folder)
@@ -165,6 +233,7 @@ def test_an_episode_that_nobody_stops(tmp_path: Path) -> None:
     recorder.start("shot", "", "", {}, START_NS)
     assert not recorder.overdue(START_NS + 5 * STEP_NS)
     assert recorder.overdue(START_NS + 5 * STEP_NS + 1)
+    feed(recorder, range(1))
     assert recorder.stop("ended by itself").message == "ended by itself"
 
 

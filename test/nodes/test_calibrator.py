@@ -37,8 +37,8 @@ def in_state(state: int) -> Callable[[CalibrationStatus], bool]:
     return lambda status: bool(status.state == state)
 
 
-def saying(message: str) -> Callable[[CalibrationStatus], bool]:
-    return lambda status: bool(status.message == message)
+def saying(*words: str) -> Callable[[CalibrationStatus], bool]:
+    return lambda status: all(word in status.message for word in words)
 
 
 def ended(status: CalibrationStatus) -> bool:
@@ -113,9 +113,9 @@ def test_feedback_a_second_one_refused_and_cancel_within_a_second(
     refused = probe.call(Trigger, "/calibrator/recalibrate")
     assert not refused.success
     assert refused.message.startswith("refused: a calibration is already running")
-    second = probe.ask(probe.ask(action.send_goal_async, goal).get_result_async)
-    assert second.status == GoalStatus.STATUS_ABORTED
-    assert second.result.message.startswith("refused: a calibration is already running")
+    second = probe.ask(action.send_goal_async, goal)
+    assert not second.accepted
+    assert probe.wait_for(heard, saying("already running")).state == CalibrationStatus.RUNNING
 
     answer = handle.get_result_async()
     probe.ask(handle.cancel_goal_async)
@@ -128,23 +128,27 @@ def test_feedback_a_second_one_refused_and_cancel_within_a_second(
 
 
 def test_bad_input_is_one_line_and_the_node_goes_on(tmp_path: Path, start_node: StartNode, probe: Probe) -> None:
-    start_node("calibrator", output=str(tmp_path / "result"))
+    start_node("calibrator", output=str(tmp_path / "out" / "result"))
     heard = probe.listen(CalibrationStatus, STATUS, LATCHED)
     action = probe.action(Calibrate, "/calibrator/calibrate")
+    there = str(Path(__file__).parents[2] / "bags")
+    (tmp_path / "out" / "mine").mkdir(parents=True)
+    (tmp_path / "out" / "mine" / "thesis.tex").touch()
     for goal, words in (
         (Calibrate.Goal(), ["no bags"]),
-        (Calibrate.Goal(bags=["/no/such/bag"]), ["/no/such/bag"]),
-        (Calibrate.Goal(bags=["/no/such/bag"], cell="air_hokey"), ["air_hokey", "air_hockey"]),
-        (Calibrate.Goal(bags=["/no/such/bag"], output=str(tmp_path)), [str(tmp_path), "not overwritten"]),
+        (Calibrate.Goal(bags=["/no/such/bag"]), ["/no/such/bag: no such bag"]),
+        (Calibrate.Goal(bags=["/no/such/bag", "/nor/this"]), ["none of the other 1 can be used either"]),
+        (Calibrate.Goal(bags=[str(tmp_path)]), [str(tmp_path), "no episodes"]),
+        (Calibrate.Goal(bags=[there], cell="air_hokey"), ["air_hokey", "air_hockey"]),
+        (Calibrate.Goal(bags=[there], output=str(tmp_path)), [str(tmp_path), "expected a folder in"]),
+        (Calibrate.Goal(bags=[there], output=str(tmp_path / "out" / "mine")), ["out/mine", "not overwritten"]),
     ):
-        answer = probe.ask(probe.ask(action.send_goal_async, goal).get_result_async)
-        assert answer.status == GoalStatus.STATUS_ABORTED
-        message = answer.result.message
-        assert all(word in message for word in words), message
-        assert "\n" not in message
-        assert "Traceback" not in message
-        probe.wait_for(heard, saying(message))
-    assert not (tmp_path / "result").exists()
+        assert not probe.ask(action.send_goal_async, goal).accepted
+        refused = probe.wait_for(heard, saying(*words))
+        assert refused.state == CalibrationStatus.FAILED
+        assert refused.message.startswith("refused: ")
+        assert "\n" not in refused.message
+    assert names(tmp_path / "out") == ["mine"]
 
 
 def test_the_end_of_the_node_ends_its_calibration(
@@ -176,9 +180,11 @@ def test_finished_episodes_of_this_cell_are_calibrated_from(
     ):
         say(EpisodeInfo(state=state, cell=cell, bag=bag))
     heard = probe.listen(CalibrationStatus, STATUS, LATCHED)
-    until(lambda: probe.call(Trigger, "/calibrator/recalibrate").success, "the calibrator to hear of an episode")
-    failed = probe.wait_for(heard, ended)
-    assert "/c" in failed.message, "the one finished episode of this cell does not exist, and that is what it says"
+    until(lambda: "/c: no such bag" in probe.call(Trigger, "/calibrator/recalibrate").message, "what it has heard of")
+    refused = probe.wait_for(heard, saying("/c"))
+    assert (refused.state, refused.message) == (CalibrationStatus.FAILED, "refused: /c: no such bag")
+    say(EpisodeInfo(state=EpisodeInfo.DISCARDED, cell="air_hockey", bag="/c"))
+    until(lambda: "no bags" in probe.call(Trigger, "/calibrator/recalibrate").message, "that nothing is left")
 
 
 def test_every_parameter_says_what_it_is(start_node: StartNode, probe: Probe) -> None:
@@ -186,8 +192,8 @@ def test_every_parameter_says_what_it_is(start_node: StartNode, probe: Probe) ->
     listed = probe.call(ListParameters, "/calibrator/list_parameters").result.names
     own = [name for name in listed if name != "use_sim_time" and "start_type_description" not in name]
     assert sorted(own) == [
-        "autostart", "bags", "calibrate_at_start", "cell", "false_alarm", "method", "newest", "output", "resume",
-        "rollouts", "running_check", "seed", "versions",
+        "autostart", "bags", "calibrate_at_start", "cell", "data_dir", "false_alarm", "frame", "method", "newest",
+        "output", "resume", "rollouts", "running_check", "seed", "versions",
     ]  # fmt: skip
     request = DescribeParameters.Request(names=own)
     described = probe.call(DescribeParameters, "/calibrator/describe_parameters", request).descriptors

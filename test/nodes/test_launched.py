@@ -19,7 +19,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from lifecycle_msgs.srv import GetState
 from rosgraph_msgs.msg import Clock
 
-from test.nodes.harness import PATIENCE_S, RELIABLE, SENSOR, SHARED_MEMORY, Probe, until
+from test.nodes.harness import PATIENCE_S, RELIABLE, SENSOR, Probe, held_locks, until
 from test.test_launch import Noted, description
 
 pytestmark = pytest.mark.ros
@@ -63,38 +63,25 @@ def commands(name: str, given: Mapping[str, str], monkeypatch: pytest.MonkeyPatc
 @contextmanager
 def started(lines: Mapping[str, list[str]], folder: Path) -> Iterator[dict[str, subprocess.Popen[bytes]]]:
     """All nodes as one process group's members are: ended by SIGINT, which must leave nothing."""
-    before = set(SHARED_MEMORY.iterdir())
     running = {}
     for name, words in lines.items():
         with (folder / f"{name}.log").open("wb") as log:
             running[name] = subprocess.Popen(words, cwd=folder, stdout=log, stderr=log, start_new_session=True)
     try:
         yield running
-        own = {path for path in set(SHARED_MEMORY.iterdir()) - before if "fastrtps_port" not in path.name}
+        own = [lock for process in running.values() for lock in held_locks(process.pid)]
+        own = [path for path in own if "fastrtps_port" not in path.name]
+        assert len(own) >= len(running)
         for process in running.values():
             process.send_signal(signal.SIGINT)
         statuses = {name: process.wait(PATIENCE_S) for name, process in running.items()}
         assert statuses == dict.fromkeys(lines, 0)
-        mine = [path for path in own if path.exists() and not held_elsewhere(path)]
-        assert mine == [], "shared memory that nobody holds"
+        assert [path for path in own if path.exists()] == [], "shared memory that nobody holds"
     finally:
         for name, process in running.items():
             if process.poll() is None:
                 os.killpg(process.pid, signal.SIGKILL)
             print(f"--- {name}\n{(folder / f'{name}.log').read_text(errors='replace')}")
-
-
-def held_elsewhere(path: Path) -> bool:
-    """Whether some process still has this file open or mapped."""
-    for process in Path("/proc").glob("[0-9]*"):
-        try:
-            if path.name in (process / "maps").read_text() or any(
-                str(link.readlink()).startswith(str(path)) for link in (process / "fd").iterdir()
-            ):
-                return True
-        except OSError:
-            continue
-    return False
 
 
 def active(probe: Probe, name: str) -> bool:
@@ -104,6 +91,7 @@ def active(probe: Probe, name: str) -> bool:
 def test_the_virtual_cell_in_a_namespace(probe: Probe, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     lines = commands("virtual_cell", {"namespace": "cell1"}, monkeypatch)
     assert set(lines) == {"virtual_cell", "puck_tracker", "recorder", "calibrator"}
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "ros"))
     with started(lines, tmp_path):
         names = {f"/cell1/{name}" for name in lines}
 
@@ -115,7 +103,8 @@ def test_the_virtual_cell_in_a_namespace(probe: Probe, monkeypatch: pytest.Monke
         heard = probe.listen(PoseWithCovarianceStamped, "/cell1/puck_tracker/puck1/pose", SENSOR)
         probe.wait_for(heard)
         assert all(active(probe, f"/cell1/{name}") for name in lines if name != "virtual_cell")
-        assert (tmp_path / "out" / "episodes").is_dir(), "the recorder's own parameter file is read"
+        assert (tmp_path / "ros" / "compass_ros" / "episodes").is_dir(), "and not in the working directory"
+        assert {path.suffix for path in tmp_path.iterdir()} == {"", ".log"}
 
 
 def test_the_real_cell_hears_the_camera_and_follows_the_simulated_clock(
@@ -123,6 +112,7 @@ def test_the_real_cell_hears_the_camera_and_follows_the_simulated_clock(
 ) -> None:
     lines = commands("cell", {"use_sim_time": "true", "prefix": "nice -n 1"}, monkeypatch)
     assert set(lines) == {"puck_tracker", "recorder", "calibrator"}
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "ros"))
     with started(lines, tmp_path) as running:
         for topic in ("image_raw", "camera_info"):
             camera = f"/camera/camera/color/{topic}"

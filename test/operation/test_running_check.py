@@ -106,3 +106,20 @@ def test_the_map_shows_where_recordings_and_simulator_differ(cell: Cell, before:
     assert {-1, 100} <= set(percent) <= set(range(-1, 101))
     start = int((-0.15 - found.origin_m[0]) // 0.03), int((0 - found.origin_m[1]) // 0.03)
     assert found.mean_m[start[1], start[0]] < found.mean_m[row, column], "at rest there is little to differ"
+
+
+def test_an_episode_that_is_discarded_leaves_the_check(
+    cell: Cell, versions: Versions, before: list[Path], after: list[Path]
+) -> None:
+    """As if it had never been: also after a restart, and one that was not counted changes nothing."""
+    check, without = (RunningCheck(cell, v, 0.01) for v in (versions, Versions(versions.folder.parent, cell.name)))
+    check.renew(before[:4])
+    for bag in (before[4], after[0], before[5]):
+        check.take(bag)
+    dropped = check.drop(after[0])
+    assert dropped == check.drop(after[1]) == RunningCheck(cell, versions, 0.01).verdict()
+    path = versions.folder / "check_0001.yaml"
+    path.unlink()
+    without.renew(before[:4])
+    without.take(before[4])
+    assert without.take(before[5]) == dropped
