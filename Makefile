@@ -6,7 +6,8 @@
 #   make prove   120 sealed worlds: conceal, calibrate blindly, unseal, count; goes on where it was stopped
 #   make real    cubes, balls and pendulums that others recorded (docs/real-data.md); the data lie in COMPASS_REAL_DATA
 #   make soak    half an hour of full load: memory, lost messages, latency; ARGS="--minutes 5" for less
-#   make fuzz    100,000 damaged bags and 100,000 damaged YAML files; a nightly job. make test tries some hundreds
+#   make fuzz    100,000 damaged bags, 100,000 damaged YAML files, and the cells; a nightly job. make test tries some hundreds
+#   make cells   200 cells drawn at random, recorded and calibrated: results, one-line refusals, tracebacks
 #   make bench   the benchmark of methods (docs/benchmarks.md); goes on where it was stopped
 #   make lint | readers | bags | lock | clean
 #
@@ -28,7 +29,7 @@ NATIVE := $(wildcard compass_ros/simulation/native/*.c)
 READERS := test/readers
 RERUN   := .venv-rerun
 
-.PHONY: demo prove real test lint bench bags readers install interfaces lock clean soak fuzz
+.PHONY: demo prove real test lint bench bags readers install interfaces lock clean soak fuzz cells
 .DELETE_ON_ERROR:
 
 demo: install
@@ -43,7 +44,10 @@ test: lint readers
 soak: install
 	$(BIN)/python scripts/soak.py $(ARGS)
 
-fuzz: install
+cells: install
+	OMP_NUM_THREADS=1 $(BIN)/python -m test.faults.fuzz_cells $(ARGS)
+
+fuzz: cells
 	$(BIN)/python -m test.faults.fuzz_bags $(ARGS)
 	$(BIN)/python -m test.faults.fuzz_yaml $(ARGS)
 

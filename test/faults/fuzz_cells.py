@@ -21,7 +21,7 @@ from threadpoolctl import threadpool_limits
 
 from compass_ros.commands.calibrate import ProgressStyle, run
 from compass_ros.errors import CompassError
-from test.faults.random_cells import drawn, recorded
+from test.faults.random_cells import FULL, Size, drawn, recorded
 
 CONFIG = {"threads": 1}
 
@@ -35,11 +35,11 @@ class Ended:
     said: str = ""
 
 
-def attempt(folder: Path, seed: int) -> Ended:
+def attempt(folder: Path, seed: int, size: Size = FULL) -> Ended:
     """Draw a cell, record it, calibrate it. Exceptions other than the suite's own are bugs."""
     try:
-        cell = drawn(folder, seed)
-        recorded(cell, seed, folder / "bags")
+        cell = drawn(folder, seed, size)
+        recorded(cell, seed, folder / "bags", size)
         run([str(folder / "bags")], str(folder / "cell.yaml"), folder / "out", CONFIG, ProgressStyle.none, "")
     except CompassError as error:
         said = str(error)

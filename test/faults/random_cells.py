@@ -20,13 +20,27 @@ from compass_ros.episodes import write_episode
 from compass_ros.simulation import Simulator
 from compass_ros.types import Episode, Floats, Track
 
-MOST_JOINTS, MOST_DRIVES, MOST_EPISODES = 8, 8, 8
 NOISE = 1e-3
 """Of every tracked number [m, rad]."""
 _START_NS = 1_700_000_000_000_000_000
 _QUANTITIES = ("xy", "xyz", "pose")
 _FELT = ("@dyna@joint_damping", "@dyna@mass", "@dyna@stiffness", "@dyna@frictionloss", "gravity_z", "@actuation@")
 """Of most cells only such parameters are tuned; of the others any, which often nothing depends on."""
+
+
+@dataclass(frozen=True)
+class Size:
+    """The most of what is drawn."""
+
+    joints: int = 8
+    drives: int = 8
+    episodes: int = 8
+    steps: int = 16
+    """Control steps of 50 ms."""
+    rate_hz: int = 100
+
+
+FULL, SMALL = Size(), Size(joints=3, drives=3, episodes=4, steps=8, rate_hz=30)
 
 
 @dataclass
@@ -52,10 +66,10 @@ class _Scene:
         return float(np.round(self.rng.uniform(low, high), 4))
 
 
-def grown(rng: np.random.Generator) -> _Scene:
-    """One to eight bodies with a joint each; only what hangs on the world can be free."""
+def _grown(rng: np.random.Generator, most: int) -> _Scene:
+    """One body or more with a joint each; only what hangs on the world can be free."""
     scene = _Scene(rng)
-    for i in range(int(rng.integers(1, MOST_JOINTS + 1))):
+    for i in range(int(rng.integers(1, most + 1))):
         parent = int(rng.integers(-1, i))
         kind = str(rng.choice(["hinge", "slide", "ball", "free"], p=[0.5, 0.2, 0.15, 0.15]))
         scene.parent.append(-1 if kind == "free" else parent)
@@ -171,17 +185,17 @@ def _actions(scene: _Scene, drives: int) -> list[dict[str, object]]:
     return out
 
 
-def drawn(folder: Path, seed: int) -> Cell:
+def drawn(folder: Path, seed: int, size: Size = FULL) -> Cell:
     """The cell of a seed, written as scene.xml and cell.yaml."""
     rng = np.random.default_rng(seed)
-    scene = grown(rng)
-    drives = int(rng.integers(0, MOST_DRIVES + 1)) if rng.random() < 0.7 else 0
+    scene = _grown(rng, size.joints)
+    drives = int(rng.integers(0, size.drives + 1)) if rng.random() < 0.7 else 0
     (folder / "scene.xml").write_text(_document(scene, drives))
     tracked = _tracked(scene)
     passive = rng.random() < 0.4
     content: dict[str, object] = {
         "name": f"random{seed}", "dynamics": "mjcf", "model": "scene.xml", "noise_m": NOISE,
-        "control_dt_s": 0.05, "horizon": int(rng.integers(6, 17)), "objects": tracked,
+        "control_dt_s": 0.05, "horizon": int(rng.integers(6, size.steps + 1)), "objects": tracked,
         "factors": [o["name"] for o in tracked],
         "start": _starts(scene, tracked) if passive or rng.random() < 0.2 else [],
         "action": [] if passive else _actions(scene, drives),
@@ -203,10 +217,10 @@ def _written(folder: Path, content: dict[str, object]) -> Cell:
     return load(folder / "cell.yaml")
 
 
-def recorded(cell: Cell, seed: int, folder: Path) -> list[Path]:
-    """Bags of the cell: three to eight episodes of other parameters than it states, with noise and lost frames."""
+def recorded(cell: Cell, seed: int, folder: Path, size: Size = FULL) -> list[Path]:
+    """Bags of the cell: three episodes or more of other parameters than it states, with noise and lost frames."""
     rng = np.random.default_rng([seed, 1])
-    episodes, rate = int(rng.integers(3, MOST_EPISODES + 1)), float(rng.choice([30, 60, 100]))
+    episodes, rate = int(rng.integers(3, size.episodes + 1)), min(int(rng.choice([30, 60, 100])), size.rate_hz)
     low, high, width = (np.array([getattr(p, what) for p in cell.parameters]) for what in ("low", "high", "half_width"))
     truth = np.clip(cell.defaults + width * rng.normal(size=len(width)), low, high)
     inputs = np.stack([_inputs(cell, rng) for _ in range(episodes)])
