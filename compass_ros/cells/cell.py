@@ -52,7 +52,7 @@ class Cell:
         """Objects, then signals, with their columns of an observation."""
         out: list[Signal] = []
         for o in self.spec.objects:
-            out.append(of_object(o.name, o.quantity, o.body, o.topic, _end(out)))
+            out.append(of_object(o.name, o.quantity, o.body, o.topic, o.frame, _end(out)))
         for s in self.spec.signals:
             out.append(of_spec(s, _end(out)))
         return tuple(out)

@@ -16,6 +16,8 @@ Name = Annotated[str, Field(max_length=200)]
 """Short enough for a message."""
 Numbers = float | tuple[float, ...]
 """One number for all, or one for each number of the series."""
+ControllerPart = Literal["reference", "feedback", "output"]
+"""Of a controller's state: what it was asked for, what it measured, what it put out."""
 OF_JOINTS: frozenset[Quantity] = frozenset({"joint_position", "joint_velocity", "joint_effort"})
 _MOST_MOCAP, _MOST_WRENCH = 7, 6
 
@@ -31,7 +33,12 @@ class InputSpec:
     ]
     of: tuple[Name, ...] = ()
     """Joints by their names in the message; of a pose, twist or wrench the numbers that are used (`x`, `vz`, ...; all
-    where it is empty); of scalars a name for each number, in their order."""
+    where it is empty); of scalars a name for each number, in their order. In messages of types that are not known,
+    paths of numbers (`motors[2].q`)."""
+    part: ControllerPart | None = None
+    """Of a controller's state; None: the reference."""
+    frame: Name = ""
+    """Of several frames on one topic (`header.frame_id`); empty: the one with most messages."""
     to: Literal["ctrl", "qfrc", "mocap", "xfrc"] = "ctrl"
     """What they set: controls of actuators, forces on joints, the pose of a mocap body, a wrench on a body (at its
     centre of mass, in the world's axes)."""
@@ -70,6 +77,10 @@ class SignalSpec:
     at: tuple[Name, ...] = ()
     """Joints, body (`position`, `pose`) or site (`wrench`, `gyro`, `accelerometer`) of the scene, where they have other
     names than `of` (without `of`: than the signal)."""
+    part: ControllerPart | None = None
+    """Of a controller's state; None: the feedback."""
+    frame: Name = ""
+    """Of several frames on one topic (`header.frame_id`); empty: the one with most messages."""
     noise: float | None = Field(None, gt=0)
     """One standard deviation of the sensor, in the unit of the quantity, where the recordings cannot say it."""
     step: float | None = Field(None, gt=0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from compass_ros.cells.series import OF_JOINTS, SignalSpec, size_of
+from compass_ros.cells.series import OF_JOINTS, ControllerPart, SignalSpec, size_of
 from compass_ros.types import NUMBERS, Quantity
 
 POSITIONS: frozenset[Quantity] = frozenset({"xy", "xyz", "position", "pose", "joint", "joint_position"})
@@ -27,6 +27,10 @@ class Signal:
     noise: float | None = None
     step: float | None = None
     fitted: bool = True
+    frame: str = ""
+    """Frame of its positions in the bags; empty: the one with most messages."""
+    part: ControllerPart | None = None
+    """Which part of a controller's state."""
 
     @property
     def jointed(self) -> bool:
@@ -52,12 +56,13 @@ class Signal:
         return self.quantity in POSITIONS
 
 
-def of_object(name: str, quantity: Quantity, body: str, topic: str, first: int) -> Signal:
+def of_object(name: str, quantity: Quantity, body: str, topic: str, frame: str, first: int) -> Signal:
     """An object of the short form."""
-    return Signal(name, quantity, topic, (), (body or name,), first)
+    return Signal(name, quantity, topic, (), (body or name,), first, frame=frame)
 
 
 def of_spec(spec: SignalSpec, first: int) -> Signal:
     """A signal of the YAML."""
     at = spec.at or spec.of or (spec.name,)
-    return Signal(spec.name, spec.quantity, spec.topic, spec.of, at, first, spec.noise, spec.step, spec.fitted)
+    own = (spec.noise, spec.step, spec.fitted, spec.frame, spec.part)
+    return Signal(spec.name, spec.quantity, spec.topic, spec.of, at, first, *own)

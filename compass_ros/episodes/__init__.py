@@ -16,7 +16,7 @@ from compass_ros.episodes.reader import (
     read_episodes,
 )
 from compass_ros.episodes.recovery import Recovery, recover, reindex, unfinished
-from compass_ros.episodes.sources import Source, default_sources
+from compass_ros.episodes.sources import Source, default_sources, default_topic
 
 __all__ = [
     "BagContent",
@@ -25,6 +25,7 @@ __all__ = [
     "Source",
     "TopicSummary",
     "default_sources",
+    "default_topic",
     "find_bags",
     "find_each",
     "list_topics",

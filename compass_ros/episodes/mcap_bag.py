@@ -31,7 +31,8 @@ def _of_records(path: Path) -> Iterator[RawTopic | RawMessage]:
         if isinstance(record, Schema):
             schemas[record.id] = record
         elif isinstance(record, Channel) and record.id not in topics:
-            topics[record.id] = _topic(record, schemas.get(record.schema_id))
+            same = sum(topic.name == record.topic for topic in topics.values())
+            topics[record.id] = _topic(record, schemas.get(record.schema_id), str(same + 1) if same else "")
             yield topics[record.id]
         elif isinstance(record, Message):
             if record.channel_id not in topics:
@@ -39,12 +40,23 @@ def _of_records(path: Path) -> Iterator[RawTopic | RawMessage]:
             yield RawMessage(topics[record.channel_id], record.log_time, record.data)
 
 
-def _topic(channel: Channel, schema: Schema | None) -> RawTopic:
-    """ROS 2 messages are `cdr`; `ros1` is what `mcap convert` makes of a ROS 1 bag, with the names of ROS 1."""
+def _topic(channel: Channel, schema: Schema | None, number: str) -> RawTopic:
+    """ROS 2 messages are `cdr`; `ros1` is what `mcap convert` makes of a ROS 1 bag, with the names of ROS 1.
+
+    `number`: among the channels of one topic, from the second on: a publisher each.
+    """
     ros1 = channel.message_encoding == "ros1"
     name = type_name(schema.name) if schema is not None else "unknown"
     if schema is None or channel.message_encoding not in ("cdr", "ros1"):
         name = f"{name} ({channel.message_encoding or 'in no encoding'})"
-    qos = channel.metadata.get("offered_qos_profiles", "")
     digest = channel.metadata.get("md5sum" if ros1 else "topic_type_hash", "")
-    return RawTopic(channel.topic, name, "" if digest == "*" else digest, ros1, qos)
+    return RawTopic(
+        channel.topic,
+        name,
+        "" if digest == "*" else digest,
+        ros1,
+        qos=channel.metadata.get("offered_qos_profiles", ""),
+        definition=schema.data.decode(errors="replace") if schema is not None else "",
+        encoding=schema.encoding if schema is not None else "",
+        publisher=channel.metadata.get("callerid", number),
+    )

@@ -6,8 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from compass_ros.types import Bools, Floats, Quantity
+from compass_ros.types import QUANTITY_SIZE, Bools, Floats, Quantity
 
+ONE_BY_ONE: frozenset[Quantity] = frozenset({"joint_position", "joint_velocity", "joint_effort", "scalar"})
+"""Quantities of several things: a row may lack some of them."""
 LEAST = 0.25
 """Largest number of a quaternion that still says an orientation: of a unit quaternion it is 0.5 or more, of one that
 was never set 0."""
@@ -18,17 +20,19 @@ def _number(index: int) -> str:
 
 
 def measured(values: Floats, quantity: Quantity) -> Bools:
-    """(F,) of rows (F, D): all numbers finite, and of a pose a quaternion that is no zero.
+    """(F,) of rows (F, D): all numbers finite (of several joints: any), and of a pose a quaternion that is no zero.
 
     Motion capture writes NaN, an empty cell or zeros for a body that it does not see, and a driver that knows no
     orientation leaves ROS's default of zeros.
     """
-    return np.asarray(np.isfinite(values).all(axis=1) & oriented(values, quantity))
+    finite = np.isfinite(values)
+    enough = finite.any(axis=1) if quantity in ONE_BY_ONE else finite.all(axis=1)
+    return np.asarray(enough & oriented(values, quantity))
 
 
 def oriented(values: Floats, quantity: Quantity) -> Bools:
     """(F,) whether a row's quaternion says an orientation; True for quantities without one."""
-    if quantity != "pose":
+    if quantity != "pose" or values.shape[1] < QUANTITY_SIZE["pose"]:  # an input may be of some of its numbers
         return np.ones(len(values), bool)
     return np.asarray(~(np.abs(values[:, 3:]).max(axis=1) < LEAST))
 

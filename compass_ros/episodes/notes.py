@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 from rosbags.typesys.stores import ros2_jazzy as ros
 
 from compass_ros.episodes.definitions import EPISODE_TYPE, SHOT_TYPE, STRING_TYPE, typestore
+from compass_ros.episodes.sources import Source
 from compass_ros.errors import BagError
 
 EPISODE_TOPIC = "/compass/episode"
@@ -66,7 +67,7 @@ class Notes:
     initial_state: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     """First state by object, where the cell does not fix it."""
     std: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    """By object: a standard deviation for each frame, or one for all; where messages cannot state it (JointState)."""
+    """By `noted_as`: a standard deviation for each row, or one for all; where messages cannot state it."""
     remarks: tuple[str, ...] = ()
     """What the import of a table left out."""
 
@@ -98,6 +99,11 @@ class _EpisodeMessage(Protocol):
     messages: int
     topics: list[str]
     message: str
+
+
+def noted_as(source: Source) -> str:
+    """What the notes call a source: an input may have the name of a signal."""
+    return f"input {source.object}" if source.drives else source.object
 
 
 def header(message: object) -> EpisodeHeader:

@@ -23,6 +23,12 @@ class RawTopic:
     ros1: bool = False
     qos: str = field(default="", compare=False)
     """The publishers' QoS profiles as a YAML list; empty where the file does not say."""
+    definition: str = field(default="", compare=False, repr=False)
+    """Text of the type's definition with its dependencies; empty where the bag does not carry it."""
+    encoding: str = field(default="ros2msg", compare=False)
+    """Of that text: `ros2msg`, `ros2idl`, `ros1msg`."""
+    publisher: str = field(default="", compare=False)
+    """Who published, where the bag tells publishers of one topic apart."""
 
 
 @dataclass(frozen=True)

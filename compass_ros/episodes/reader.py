@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from compass_ros.episodes.bag import RawMessage, RawTopic, Remark, bag_name, decode, is_bag, scan
+from compass_ros.episodes.clocks import on_one_clock
 from compass_ros.episodes.definitions import EPISODE_TYPES, SHOT_TYPES, STRING_TYPE
-from compass_ros.episodes.measured import left_out, measured
-from compass_ros.episodes.notes import NOTES_TOPIC, SHOT_TOPIC, EpisodeHeader, Notes, Shot, header, notes, shot
-from compass_ros.episodes.sources import KNOWN_TYPES, Row, Source, entries, plain_frame, rows
+from compass_ros.episodes.messages import KINDS
+from compass_ros.episodes.notes import (
+    NOTES_TOPIC,
+    SHOT_TOPIC,
+    EpisodeHeader,
+    Notes,
+    Shot,
+    header,
+    noted_as,
+    notes,
+    shot,
+)
+from compass_ros.episodes.rows import Rows, Stream, TopicReader, joined
+from compass_ros.episodes.sources import Source
+from compass_ros.episodes.tracks import tracks
 from compass_ros.errors import BagError, nearest
-from compass_ros.types import Episode, Floats, Track
+from compass_ros.types import Episode, Track
+
+Streams = dict[Source, dict[Stream, Rows]]
 
 EARLY_SHOT_NS = 10**9
 """A shot stamped longer than this before the start of its recording belongs to an earlier episode [ns]."""
@@ -97,18 +113,23 @@ def read_bag(path: str | Path, sources: Sequence[Source], cell: str = "", cell_h
             one shot, without one usable measurement of an object, or with stamps out of order.
     """
     path = Path(path)
-    content = _Content({source: [] for source in sources})
+    content = _Content(sources)
     for item in scan(path):
         _count(content.counts, item)
         if isinstance(item, Remark):
             content.remarks.append(item.text)
         elif isinstance(item, RawMessage):
-            try:
+            with _named(path):
                 content.take(item)
-            except BagError as error:
-                raise BagError(f"{path}: {error}") from error
-    try:
+    with _named(path):
         return BagContent(_episode(path, content, cell, cell_hash), _summaries(content.counts))
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """A BagError says in which bag it was."""
+    try:
+        yield
     except BagError as error:
         raise BagError(f"{path}: {error}") from error
 
@@ -116,24 +137,24 @@ def read_bag(path: str | Path, sources: Sequence[Source], cell: str = "", cell_h
 class _Content:
     """What one pass over a bag collects."""
 
-    def __init__(self, tracks: dict[Source, list[Row]]) -> None:
-        self.tracks = tracks
+    def __init__(self, sources: Sequence[Source]) -> None:
+        self.sources = sources
         self.counts: dict[RawTopic, int] = {}
-        self.latched: dict[Source, list[Row]] = {}
+        self.latched: Streams = {}
         """Rows from before the episode: all there is of an object whose pose was published once."""
         self.headers: list[EpisodeHeader] = []
         self.shots: list[tuple[str, Shot]] = []
-        self.others: dict[Source, set[str]] = {}
-        """Joints or frames of messages on a source's topic that do not hold it."""
+        self.entries: dict[str, set[str]] = {}
+        """By topic: what the messages call the things that they hold."""
         self.notes = Notes()
         self.remarks: list[str] = []
         """On the bag's files."""
-        self._by_topic: dict[str, list[Source]] = {}
+        self._readers: dict[int, tuple[RawTopic, TopicReader | None]] = {}
+        """By the topic's identity, which no other has while it is kept; None: nobody asks for it."""
         self._types: dict[str, str] = {}
-        for source in tracks:
-            self._by_topic.setdefault(source.topic, []).append(source)
 
     def take(self, message: RawMessage) -> None:
+        """Raises BagError."""
         topic = message.topic
         if topic.ros1:
             pass  # our own messages are ROS 2 ones
@@ -145,46 +166,64 @@ class _Content:
             self.shots.append((topic.name, shot(decode(message))))
         elif (topic.name, topic.type) == (NOTES_TOPIC, STRING_TYPE):
             self.notes = notes(decode(message))
-        for source in self._by_topic.get(topic.name, ()):
-            if self._types.setdefault(topic.name, topic.type) != topic.type:
-                raise BagError(f"{topic.name} changes from {self._types[topic.name]} to {topic.type} in this bag")
-            if topic.type not in KNOWN_TYPES:
-                raise BagError(f"{topic.name} is a {topic.type}; expected one of {', '.join(sorted(KNOWN_TYPES))}")
-            decoded = decode(message)
-            found = list(rows(decoded, topic.type, source))
-            if not found:
-                self.others.setdefault(source, set()).update(entries(decoded, topic.type))
-            self.tracks[source] += found
+        if id(topic) not in self._readers:
+            self._readers[id(topic)] = topic, self._reader(topic)
+        _, reader = self._readers[id(topic)]
+        if reader is not None:
+            reader.take(message)
+
+    def streams(self) -> Streams:
+        """The rows collected so far, by source; they are let go of. Raises BagError."""
+        found: dict[Source, dict[Stream, list[Rows]]] = {}
+        for _, reader in self._readers.values():
+            if reader is not None:
+                for source, streams in reader.taken().items():
+                    for stream, rows in streams.items():
+                        found.setdefault(source, {}).setdefault(stream, []).extend(rows)
+                self.entries.setdefault(reader.topic.name, set()).update(reader.entries)
+        # Each is let go of as it is joined, so that the rows are held once.
+        return {s: {stream: joined(found[s].pop(stream)) for stream in [*found[s]]} for s in found}
+
+    def _reader(self, topic: RawTopic) -> TopicReader | None:
+        own = [source for source in self.sources if source.topic == topic.name]
+        if not own:
+            return None
+        if self._types.setdefault(topic.name, topic.type) != topic.type:
+            raise BagError(f"{topic.name} changes from {self._types[topic.name]} to {topic.type} in this bag")
+        return TopicReader(topic, own)
 
     def _begin(self) -> None:
         """What stands before the first header is latched: it came before the episode and is no sample of its motion."""
-        self.latched = {source: found for source, found in self.tracks.items() if found}
-        self.tracks = {source: [] for source in self.tracks}
+        self.latched = self.streams()
         self.shots.clear()
 
 
 def _episode(path: Path, content: _Content, cell: str, cell_hash: str) -> Episode:
+    streams = content.streams()
     head = content.headers[0] if content.headers else EpisodeHeader("finished", bag_name(path))
     if cell and head.cell and head.cell != cell:
         raise BagError(f"recorded in another cell: expected '{cell}', found '{head.cell}'")
     if cell_hash and head.cell_hash and head.cell_hash != cell_hash:
         raise BagError(f"recorded in another '{cell}': expected configuration {cell_hash}, found {head.cell_hash}")
-    latched = content.latched
-    found = [_tracks(source, rows or latched.get(source, []), content) for source, rows in content.tracks.items()]
-    tracks = tuple(track for (track, *_), _ in found)
+    rows = {source: streams.get(source) or content.latched.get(source, {}) for source in content.sources}
+    aligned, clocks = on_one_clock(rows)
+    found = {source: _tracks(source, aligned[source], content) for source in content.sources}
+    own = [made for source, (made, _) in found.items() if not source.drives]
     fired = _fired(content.shots, head)
-    first_ns = min((int(track.stamp_ns[0]) for track in tracks), default=0)
+    first_ns = min((int(track.stamp_ns[0]) for track, *_ in own), default=0)
+    said = (remark for _, remarks in found.values() for remark in remarks)
     return Episode(
         name=head.episode or bag_name(path),
         cell=head.cell or cell,
         cell_hash=head.cell_hash,
         action=fired.action if fired else {},
         start_ns=fired.stamp_ns if fired else head.start_ns or first_ns,
-        tracks=tracks,
+        tracks=tuple(track for track, *_ in own),
         initial_state=content.notes.initial_state,
         source=str(path),
-        others=tuple(track for (_, *others), _ in found for track in others),
-        remarks=(*content.remarks, *content.notes.remarks, *(remark for _, said in found for remark in said)),
+        others=tuple(track for _, *others in own for track in others),
+        remarks=(*content.remarks, *content.notes.remarks, *clocks, *said),
+        inputs=tuple(track for source, ((track, *_), _) in found.items() if source.drives),
     )
 
 
@@ -199,79 +238,30 @@ def _fired(shots: Sequence[tuple[str, Shot]], head: EpisodeHeader) -> Shot | Non
     return recent[0] if recent else None
 
 
-def _tracks(source: Source, found: Sequence[Row], content: _Content) -> tuple[tuple[Track, ...], list[str]]:
-    """The tracks of one object, one for each frame it is seen in, the one to use first; and what there is to say."""
-    if not found:
-        raise BagError(_no_messages(source, content))
-    frames: dict[str, list[Row]] = {}
-    for row in found:
-        frames.setdefault(row.frame, []).append(row)
-    ordered = sorted(frames, key=lambda name: len(frames[name]), reverse=True)
-    if source.frame:
-        wanted = plain_frame(source.frame)
-        if wanted not in frames:
-            raise BagError(
-                f"{source.topic}: {source.object} is not seen in the frame '{wanted}', but in {_some(ordered)}"
-            )
-        ordered.sort(key=lambda name: name != wanted)
-    tracks, remarks = zip(*(_track(source, frames[name], content) for name in ordered), strict=True)
-    said = [remark for remark in remarks[:1] if remark]
-    if len(frames) > 1 and not source.frame:
-        counts = ", ".join(f"'{name}' ({len(frames[name])} messages)" for name in ordered)
-        where = f"{source.object} is seen on {source.topic} in {len(frames)} frames, {counts}"
-        said.append(f"{where}: only '{ordered[0]}' is used; `frame` in the cell's YAML names another")
-    return tracks, said
+def _tracks(source: Source, streams: Mapping[Stream, Rows], content: _Content) -> tuple[list[Track], list[str]]:
+    """As `tracks.tracks`; raises BagError also where the source, or one of its numbers, never comes."""
+    if not streams:
+        raise BagError(_no_messages(source, source.wanted, content))
+    made, said = tracks(source, streams, content.notes.std.get(noted_as(source)))
+    never = [name for name, values in zip(source.of, made[0].value.T, strict=False) if np.isnan(values).all()]
+    if never:
+        raise BagError(_no_messages(source, never, content))
+    return made, said
 
 
-def _track(source: Source, found: Sequence[Row], content: _Content) -> tuple[Track, str]:
-    """Track of the rows of one frame, and what was left out of it."""
-    every = np.array([row.value for row in found], float)
-    kept = measured(every, source.quantity)
-    remark = left_out(every, source.quantity, f"messages of {source.object} on {source.topic}")
-    if not kept.any():
-        unset = source.quantity == "pose" and bool(np.isfinite(every).all())
-        hint = "; its positions alone are usable: `quantity: xyz`" if unset else ""
-        raise BagError(f"{remark}: nothing is left of {source.object}{hint}")
-    used = [row for row, use in zip(found, kept, strict=True) if use]
-    once = [row for index, row in enumerate(used) if index == 0 or row != used[index - 1]]
-    stamps = np.array([row.stamp_ns for row in once], np.int64)
-    backwards = np.flatnonzero(np.diff(stamps) <= 0)
-    if backwards.size:
-        index = int(backwards[0]) + 1
-        step = int(stamps[index] - stamps[index - 1])
-        how = f"{-step} ns before the one before it" if step else "as is the one before it"
-        where = f"message {index + 1} of {source.object} is stamped {stamps[index]} ns, {how}"
-        raise BagError(f"{source.topic}: stamps out of order: {where}")
-    values = np.array([row.value for row in once], float)
-    std = _std(once, source, content.notes)
-    return Track(source.object, source.quantity, stamps, values, std, once[0].frame), remark
-
-
-def _std(found: Sequence[Row], source: Source, said: Notes) -> Floats | None:
-    stated = [row.std for row in found if row.std is not None]
-    if len(stated) < len(found):
-        noted = said.std.get(source.object)
-        if noted is None:
-            return None
-        stated = list(noted) if len(noted) == len(found) else [noted[0]] * len(found)
-    bad = np.flatnonzero(~np.isfinite(stated))
-    if bad.size:
-        which = f"message {bad[0] + 1} ({bad.size} of {len(stated)} messages): {stated[bad[0]]}"
-        raise BagError(f"{source.topic}: standard deviation of {source.object} is not finite in {which}")
-    return np.array(stated)
-
-
-def _no_messages(source: Source, content: _Content) -> str:
+def _no_messages(source: Source, wanted: Sequence[str], content: _Content) -> str:
     names = sorted({topic.name for topic in content.counts})
-    if source.topic in names:
-        wanted, others = source.entry or source.object, sorted(content.others.get(source, ()))
-        what = f" of '{wanted}'" if source.entry or source.quantity == "joint" else ""
-        there = f"; there are {_some(others)}{nearest(wanted, others)}" if others else ""
-        if wanted in others:
-            return f"{source.topic} names '{wanted}', but holds no '{source.quantity}' of it"
-        return f"no messages{what} on {source.topic} ({source.object} was never seen){there}"
-    known = f"it has {_some(names)}" if names else "it has no topics"
-    return f"no topic {source.topic} for {source.object}; {known}{nearest(source.topic, names)}"
+    if source.topic not in names:
+        known = f"it has {_some(names)}" if names else "it has no topics"
+        return f"no topic {source.topic} for {source.object}; {known}{nearest(source.topic, names)}"
+    others = sorted(content.entries.get(source.topic, ()))
+    held = [name for name in wanted if name in others]
+    if held:
+        return f"{source.topic} names '{held[0]}', but holds no '{source.quantity}' of it"
+    named = source.entry or source.of or source.quantity == "joint"
+    what = f" of {', '.join(map(repr, wanted))}" if named else ""
+    there = f"; there are {_some(others)}{nearest(wanted[0], others)}" if others else ""
+    return f"no messages{what} on {source.topic} ({source.object} was never seen){there}"
 
 
 def _some(names: Sequence[str]) -> str:
@@ -286,7 +276,7 @@ def _count(counts: dict[RawTopic, int], item: RawTopic | RawMessage | Remark) ->
 
 
 def _summaries(counts: Mapping[RawTopic, int]) -> tuple[TopicSummary, ...]:
-    known = KNOWN_TYPES | EPISODE_TYPES | SHOT_TYPES
+    known = KINDS.keys() | EPISODE_TYPES | SHOT_TYPES
     return tuple(
         TopicSummary(topic.name, topic.type, count, topic.type in known or topic.name == NOTES_TOPIC)
         for topic, count in sorted(counts.items(), key=lambda item: (item[0].name, item[0].type))

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import lz4.frame  # type: ignore[import-untyped]
+from rosbags.interfaces import Connection, ConnectionExtRosbag1
 from rosbags.rosbag1 import Reader, ReaderError
 from rosbags.rosbag1.reader import Chunk, IndexData, decompressors
 
@@ -31,12 +32,25 @@ def messages(path: Path) -> Iterator[RawTopic | RawMessage]:
         with _BoundedReader(path) as reader:
             for connection, log_ns, data in reader.messages():
                 if connection.id not in topics:
-                    topics[connection.id] = RawTopic(connection.topic, connection.msgtype, connection.digest, ros1=True)
+                    topics[connection.id] = _topic(connection)
                     yield topics[connection.id]
                 yield RawMessage(topics[connection.id], log_ns, data)
     except BROKEN as error:
         hint = "; `rosbag reindex` of ROS 1 does it" if "not indexed" in str(error) else ""
         raise BagError(f"not a readable ROS 1 bag: {one_line(error)}{hint}") from error
+
+
+def _topic(connection: Connection) -> RawTopic:
+    """Each publisher has a connection of its own."""
+    return RawTopic(
+        connection.topic,
+        connection.msgtype,
+        connection.digest,
+        ros1=True,
+        definition=connection.msgdef.data,
+        encoding="ros1msg",
+        publisher=(connection.ext.callerid or "") if isinstance(connection.ext, ConnectionExtRosbag1) else "",
+    )
 
 
 class _BoundedReader(Reader):

@@ -58,14 +58,13 @@ def _rows(database: sqlite3.Connection, size: int) -> Iterator[RawTopic | RawMes
     database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(LARGEST_MESSAGE, size))
     columns = {"topics": {"id", "name", "type"}, "messages": {"topic_id", "timestamp", "data"}}
     for table, expected in columns.items():
-        # hidden = 0: stored columns of real tables only, so nothing is computed while we read
-        stored = {row[1] for row in database.execute(f"PRAGMA table_xinfo({table})") if row[6] == 0}
-        found = database.execute("SELECT type FROM sqlite_master WHERE name = ?", (table,)).fetchall()
-        if found != [("table",)] or not expected <= stored:
+        if not _stored(database, table, expected):
             raise BagError(f"not a rosbag2 database: expected a table '{table}' with {sorted(expected)}")
     topics = {}
+    definitions = _definitions(database)
     for key, name, kind_of in database.execute("SELECT id, name, type FROM topics ORDER BY id"):
-        topics[key] = RawTopic(str(name), type_name(str(kind_of)))
+        text, encoding = definitions.get(str(kind_of), ("", "ros2msg"))
+        topics[key] = RawTopic(str(name), type_name(str(kind_of)), definition=text, encoding=encoding)
         yield topics[key]
     rows_left = size // 8
     for key, log_ns, data in database.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY rowid"):
@@ -73,3 +72,20 @@ def _rows(database: sqlite3.Connection, size: int) -> Iterator[RawTopic | RawMes
         if key not in topics or not isinstance(data, bytes) or not isinstance(log_ns, int) or rows_left < 0:
             raise BagError("damaged: a row of 'messages' is not a message of a known topic")
         yield RawMessage(topics[key], log_ns, data)
+
+
+def _stored(database: sqlite3.Connection, table: str, expected: set[str]) -> bool:
+    """Whether a real table has these columns."""
+    # hidden = 0: stored columns only, so nothing is computed while we read
+    stored = {row[1] for row in database.execute(f"PRAGMA table_xinfo({table})") if row[6] == 0}
+    found = database.execute("SELECT type FROM sqlite_master WHERE name = ?", (table,)).fetchall()
+    return found == [("table",)] and expected <= stored
+
+
+def _definitions(database: sqlite3.Connection) -> dict[str, tuple[str, str]]:
+    """Text and encoding of the definitions by type; rosbag2 writes them since version 4 of its format."""
+    names = ("topic_type", "encoding", "encoded_message_definition")
+    if not _stored(database, "message_definitions", {*names}):
+        return {}
+    rows = database.execute(f"SELECT {', '.join(names)} FROM message_definitions ORDER BY rowid")
+    return {str(kind): (str(text), str(encoding)) for kind, encoding, text in rows}

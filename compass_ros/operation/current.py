@@ -10,7 +10,7 @@ import numpy as np
 
 from compass_ros.cells import Cell
 from compass_ros.cells.auto import with_auto
-from compass_ros.episodes import Reading, Source, default_sources, find_each, read_each, read_episode
+from compass_ros.episodes import Reading, Source, default_topic, find_each, read_each, read_episode
 from compass_ros.episodes.bag import bag_name
 from compass_ros.reporting.result_json import read_result
 from compass_ros.simulation import Simulator
@@ -101,10 +101,33 @@ def _inside(cell: Cell, name: str, value: float) -> float:
 
 
 def sources(cell: Cell) -> list[Source]:
-    """Where the tracks of a cell's objects are in its bags; by default where tracker and import put them."""
-    return [
-        Source(o.topic or default_sources([o.name], o.quantity)[0].topic, o.name, o.quantity, frame=o.frame)
-        for o in cell.objects
+    """Where a cell's objects, signals and inputs are in its bags; by default where tracker, robots and import put them.
+
+    A controller's state gives an input what was asked for, and a signal what was measured, unless the cell says else.
+    """
+    found = [
+        Source(
+            s.topic or default_topic(s.name, s.quantity),
+            s.name,
+            s.quantity,
+            entry="" if s.jointed or not s.of else s.of[0],
+            frame=s.frame,
+            of=s.of if s.jointed else (),
+            part=s.part or "feedback",
+        )
+        for s in cell.signals
+    ]
+    return found + [
+        Source(
+            i.topic or default_topic(i.name, i.quantity, drives=True),
+            i.name,
+            i.quantity,
+            frame=i.frame,
+            of=i.of,
+            part=i.part or "reference",
+            drives=True,
+        )
+        for i in cell.spec.inputs
     ]
 
 

@@ -85,7 +85,7 @@ def test_joints_come_in_any_order_and_not_all_in_each_message(tmp_path: Path) ->
 
 
 def test_positions_that_were_asked_for_and_do_not_fit(tmp_path: Path) -> None:
-    with pytest.raises(BagError, match="a JointState has 2 names and 1 positions"):
+    with pytest.raises(BagError, match="a JointState has 2 names and 1 numbers in its position"):
         read_episode(bag(tmp_path / "b", "/joints", joints(0, ["swing", "x"], [0.1])), SWING)
 
 
