@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -60,7 +61,8 @@ class TopicReader:
                 raise BagError(f"{topic.name} is a {topic.type}; expected one of {', '.join(sorted(KINDS))}")
         self.topic = topic
         self._sources = sources
-        self._fields: Fields = fields_of(topic)
+        with _named(topic):
+            self._fields: Fields = fields_of(topic)
         self._data: list[bytes] = []
         self._log: list[int] = []
         self._size = 0
@@ -105,10 +107,20 @@ class TopicReader:
             own = np.flatnonzero(sizes == size)
             messages = matrix([self._data[i] for i in own])
             while len(own):
-                found = layout(self._fields, self.topic.type, self._data[own[0]], self.topic.ros1)
+                with _named(self.topic):
+                    found = layout(self._fields, self.topic.type, self._data[own[0]], self.topic.ros1)
                 same = alike(messages, 0, found.fixed)
                 yield own[same], messages[same], found
                 own, messages = own[~same], messages[~same]
+
+
+@contextmanager
+def _named(topic: RawTopic) -> Iterator[None]:
+    """A BagError says on which topic it was."""
+    try:
+        yield
+    except BagError as error:
+        raise BagError(f"{topic.name}: {error}") from error
 
 
 def joined(parts: Sequence[Rows]) -> Rows:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import ChainMap
 from collections.abc import Mapping
 from functools import cache
@@ -16,6 +17,9 @@ from compass_ros.errors import BagError
 
 LONGEST = 2**20
 """Of a definition's text; those of ROS have up to some 60 kB [characters]."""
+
+_NOT_PARSED = re.compile(r"^\s*(#|//).*$", re.MULTILINE)
+"""Lines of IDL that rosbags refuses: includes (what they name follows in the text, or is standard) and comments."""
 
 
 def fields_of(topic: RawTopic) -> Fields:
@@ -76,7 +80,7 @@ def _parsed(type_name: str, text: str, encoding: str, ros1: bool) -> Fields:
 def _from_idl(text: str) -> Typesdict:
     """Types of several definitions, as rosbag2 puts them together."""
     found: Typesdict = {}
-    for part in text.replace("\r\n", "\n").split("=" * 80 + "\n"):
+    for part in _NOT_PARSED.sub("", text.replace("\r\n", "\n")).split("=" * 80 + "\n"):
         found |= get_types_from_idl(part.partition("\n")[2] if part.startswith("IDL: ") else part) if part else {}
     return found
 

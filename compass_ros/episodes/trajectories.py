@@ -14,7 +14,8 @@ def executed(source: Source, rows: Rows) -> Rows:
     """The points that came to be, by their stamps, joint by joint: a message names those that it moves.
 
     Where a message begins, the point that the one before had reached until then stands between them (on the straight
-    line between its points, or its last one), as ros2_control's joint trajectory controller goes on from there.
+    line between its points, or its last one), as ros2_control's joint trajectory controller goes on from there. So the
+    line through all of them (`hold: linear`) is what was asked for at any moment.
 
     Raises:
         BagError: The points of a message are not in the order of their times.
@@ -49,14 +50,20 @@ def _joint(source: Source, rows: Rows, column: int) -> tuple[Ints, Floats]:
 
 
 def _replace(stamps: list[int], values: list[float], begin: int, first: int) -> None:
-    """Take back what is still to come when a message begins, and say how far the one before had come."""
+    """Take back what is still to come when a message begins, and say how far the one before had come.
+
+    Where the new one jumps, its first point being at its beginning, that is said for the nanosecond before.
+    """
     after: tuple[int, float] | None = None
     while stamps and stamps[-1] >= begin:
         after = stamps.pop(), values.pop()
-    if not stamps or first <= begin:
+    at = begin if first > begin else begin - 1
+    if stamps and after is not None:
+        reached = values[-1] + (after[1] - values[-1]) * (at - stamps[-1]) / (after[0] - stamps[-1])
+    elif stamps or after is not None:
+        reached = values[-1] if after is None else after[1]  # of the first one only its point is known
+    else:
         return
-    reached = values[-1]
-    if after is not None:
-        reached += (after[1] - reached) * (begin - stamps[-1]) / (after[0] - stamps[-1])
-    stamps.append(begin)
-    values.append(reached)
+    if not stamps or stamps[-1] < at:
+        stamps.append(at)
+        values.append(reached)
