@@ -94,7 +94,7 @@ $(STAMPS)/locked: requirements.lock | $(BIN)/python
 
 # Editable, so that the sources are what runs. An editable install compiles the native library beside its source, but
 # carries no data files; the second command puts those where `ros2 run` looks.
-$(STAMPS)/package: $(STAMPS)/locked setup.py setup.cfg pyproject.toml package.xml $(SHARED) $(NATIVE)
+$(STAMPS)/package: $(STAMPS)/locked setup.py pyproject.toml package.xml $(SHARED) $(NATIVE)
 	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps -e .
 	PYTHONWARNINGS=ignore $(BIN)/python setup.py --quiet install_data --install-dir $(VENV)
 	@touch $@

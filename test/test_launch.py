@@ -14,7 +14,7 @@ import yaml
 ROOT = Path(__file__).parents[1]
 STAND_IN = {
     "launch": ("LaunchDescription",),
-    "launch.actions": ("DeclareLaunchArgument", "SetEnvironmentVariable"),
+    "launch.actions": ("DeclareLaunchArgument", "SetEnvironmentVariable", "Shutdown"),
     "launch.substitutions": ("LaunchConfiguration", "PathJoinSubstitution"),
     "launch_ros": (),
     "launch_ros.actions": ("Node",),
@@ -79,6 +79,23 @@ def test_every_node_exists_and_has_its_file_of_parameters(
         content = yaml.safe_load((ROOT / "config" / f"{node['executable']}.yaml").read_text())
         assert list(content) == ["/**"]
         assert {"namespace", "use_sim_time", f"{node['executable']}_parameters"} <= used(node)
+
+
+@pytest.mark.parametrize("name", ["virtual_cell", "cell"])
+def test_the_end_of_any_node_ends_all(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    nodes = [entity.words for entity in description(name, monkeypatch) if entity.kind == "Node"]
+    assert [node["on_exit"].kind for node in nodes] == ["Shutdown"] * len(nodes)
+    assert len({node["on_exit"].words["reason"] for node in nodes}) == len(nodes), "each says which it was"
+
+
+@pytest.mark.parametrize("name", ["virtual_cell", "cell"])
+def test_the_tables_frame_is_one_argument(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    nodes = {e.words["executable"]: e.words for e in description(name, monkeypatch) if e.kind == "Node"}
+    assert {"puck_tracker", "calibrator"} <= {executable for executable, node in nodes.items() if "frame" in used(node)}
+    publisher = nodes.get("static_transform_publisher")
+    assert publisher is None or "frame" in used(publisher)
+    said = {words for node in nodes.values() for words in node.get("arguments", ()) if isinstance(words, str)}
+    assert "table" not in said
 
 
 @pytest.mark.parametrize("name", ["virtual_cell", "cell"])

@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import os
 import re
+import shlex
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -12,9 +14,11 @@ from collections.abc import Iterator
 from importlib.metadata import Distribution, packages_distributions
 from itertools import pairwise
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
+from compass_ros.nodes import INTERFACES, MISSING
 from test.test_layering import HOMES, MODULES, ROOT, imports
 
 NODES = ("calibration_client", "calibrator", "puck_tracker", "recorder", "shooter", "virtual_cell")
@@ -120,3 +124,79 @@ def test_ros2_run_finds_a_stub_that_starts_the_node(node: str) -> None:
     assert done.returncode
     assert done.stderr.splitlines()[-1].startswith(f"{node}: failed to initialize rcl: Couldn't parse parameter")
     assert "Couldn't parse parameter override rule" in done.stderr
+
+
+ROSDEP = {
+    "jinja2": "python3-jinja2", "jsonschema": "python3-jsonschema", "matplotlib": "python3-matplotlib",
+    "numpy": "python3-numpy", "opencv-python": "python3-opencv", "openpyxl": "python3-openpyxl",
+    "pydantic": "python3-pydantic", "pyyaml": "python3-yaml", "rich": "python3-rich", "scikit-learn": "python3-sklearn",
+    "scipy": "python3-scipy", "torch": "python3-torch", "typer": "python3-typer",
+}  # fmt: skip
+"""Libraries that rosdep has from Ubuntu's packages (rosdistro, rosdep/python.yaml); of others it has none, or pip's."""
+STARTED = {"launch", "launch_ros", "tf2_ros", "rmw_fastrtps_cpp"}
+"""Used by the launch files and by the middleware's name, not imported by the package."""
+
+
+def depends(kind: str) -> set[str]:
+    return {one.text or "" for one in ElementTree.parse(ROOT / "package.xml").findall(kind)}
+
+
+def test_package_xml_names_all_that_is_imported_and_all_that_rosdep_has() -> None:
+    firsts = {name.partition(".")[0] for path in MODULES for name in imports(ast.parse(path.read_text("utf-8")))}
+    expected = (firsts & FROM_ROS) | STARTED | {ROSDEP[name] for name in declared() & ROSDEP.keys()}
+    assert depends("exec_depend") == expected
+
+
+def test_package_xml_names_what_only_tests_import() -> None:
+    tests = [path for path in (ROOT / "test").rglob("*.py") if path.name != "test_launch.py"]
+    firsts = {name.partition(".")[0] for path in tests for name in imports(ast.parse(path.read_text("utf-8")))}
+    ours = depends("exec_depend")
+    assert depends("test_depend") == {name for name in firsts if name.endswith("_msgs") and name not in ours}
+
+
+@pytest.mark.ros
+def test_colcon_finds_both_packages_as_the_docs_say_and_puts_compass_on_the_path(tmp_path: Path) -> None:
+    """One command after the clone; then everything under `src` is found. The interfaces are not built anew here."""
+    workspace, clone = tmp_path, tmp_path / "src" / "compass_ros"
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.split(
+        "\n"
+    )
+    left = ("", "bags", "test", "docs", "proof", "examples", "benchmarks")
+    for name in (name for name in listed if name.split("/")[0] not in left and (ROOT / name).exists()):
+        (clone / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(ROOT / name, clone / name)
+    command = next(line for line in (ROOT / "docs" / "install.md").read_text().splitlines() if line.startswith("ln -s"))
+    assert command in MISSING[INTERFACES]
+    subprocess.run(shlex.split(command), cwd=workspace, check=True)
+    built = workspace / "install" / INTERFACES / "share" / INTERFACES
+    built.mkdir(parents=True)
+    (built / "package.sh").touch()
+    environment = os.environ | {"AMENT_PREFIX_PATH": str(PREFIX), "PATH": f"{PREFIX / 'bin'}:{os.environ['PATH']}"}
+
+    def run(*words: str) -> str:
+        done = subprocess.run(words, cwd=workspace, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    colcon = (sys.executable, "-m", "colcon")
+    assert {line.split("\t")[0] for line in run(*colcon, "list").splitlines()} == {"compass_ros", INTERFACES}
+    run(*colcon, "build", "--packages-select", "compass_ros")
+    found = run("bash", "-c", ". install/setup.bash && command -v compass && compass --version")
+    assert found.splitlines()[0] == str(workspace / "install" / "compass_ros" / "bin" / "compass")
+    nodes = workspace / "install" / "compass_ros" / "lib" / "compass_ros"
+    assert {path.name for path in nodes.iterdir()} == set(NODES), "what `ros2 run` finds"
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("missing", sorted(MISSING))
+@pytest.mark.parametrize("node", ["recorder", "calibrator", "shooter"])
+def test_a_node_without_its_messages_says_what_to_run(missing: str, node: str) -> None:
+    code = (
+        "import importlib.util, runpy\n"
+        "found = importlib.util.find_spec\n"
+        f"importlib.util.find_spec = lambda name, *rest: None if name == {missing!r} else found(name, *rest)\n"
+        f"runpy.run_module('compass_ros.nodes.{node}', run_name='__main__')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr == f"compass_ros: {MISSING[missing]}\n"
