@@ -19,7 +19,7 @@ import numpy as np
 from compass_ros.cells.auto_drives import actuator_fields, tendon_fields
 from compass_ros.cells.auto_joints import joint_fields
 from compass_ros.cells.candidate import Candidate, around, times
-from compass_ros.cells.made_fields import moments
+from compass_ros.cells.made_inertias import moments
 
 _GEOM, _JOINT = mujoco.mjtGeom, mujoco.mjtJoint
 _SIZES = {

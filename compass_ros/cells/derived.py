@@ -31,7 +31,7 @@ def clear_shortcuts(model: mujoco.MjModel, used: set[str]) -> None:
         model.geom_sameframe[:] = 0
     if used & {"site_pos", "site_quat"}:
         model.site_sameframe[:] = 0
-    if used & {"body_ipos", "body_iquat", "inertia_turn"}:
+    if used & {"body_ipos", "body_iquat", "inertia_turn", "inertia_log_cholesky"}:
         model.body_sameframe[:] = 0
     if used & set(_GEOM_FIELDS):
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from compass_ros.cells.derived import clear_shortcuts, followers
-from compass_ros.cells.made_fields import ELEMENT, OUTSIDE, Made, early_writers, late_writers
+from compass_ros.cells.made_fields import ELEMENT, OUTSIDE, PARTS, WHOLE, Made, early_writers, late_writers
 from compass_ros.cells.spec import ParameterSpec
 from compass_ros.errors import ConfigError, nearest
 from compass_ros.types import Floats, Ints
@@ -140,6 +140,7 @@ class Fields:
         made: list[Made] = []
         self._plain: dict[str, tuple[Ints, Ints]] = {}
         used = set()
+        _check_inertias(parameters, where)
         for column, spec in parameters:
             here = f"{where}: {spec.name}"
             name, index = parse(spec.field, here)
@@ -168,6 +169,15 @@ class Fields:
                 writer(model, row)
             for follow in self._followers:
                 follow(model)
+
+
+def _check_inertias(parameters: Sequence[tuple[int, ParameterSpec]], where: str) -> None:
+    """Raises ConfigError for a body whose inertia is tuned as a whole and in parts."""
+    tuned = [(p.name, p.field.partition("[")[0], {o.strip() for o in p.of.split(",")}) for _, p in parameters]
+    whole = set[str]().union(*(of for _, field, of in tuned if field == WHOLE))
+    for name, field, of in tuned:
+        if field in PARTS and of & whole:
+            raise ConfigError(f"{where}: {name}: body '{min(of & whole)}' is tuned by {WHOLE} as well; use one of them")
 
 
 def _set(model: mujoco.MjModel, array: str, flat: Ints, values: Floats) -> None:

@@ -8,6 +8,7 @@
 | `contact_solref[i]`, `contact_solimp[i]` | geom | a contact pair takes the mean of its two geoms |
 | `contact_friction[i]` | geom | the same for sliding (0), turning (1) and rolling (2) friction |
 | `body_moment[axis]` | body | second moment of its mass along a principal axis: the inertia about the other two |
+| `inertia_log_cholesky[i]` | body | mass, centre and inertia of a real body, whatever the values: made_inertias.py |
 | `joint_zero` | joint | what its encoder shows where the scene has the joint at zero |
 | `servo_gain` | actuator | strength of a drive: its gain, and the bias that belongs to it in proportion |
 | `command_scale` | actuator | share of the command that arrives |
@@ -26,6 +27,7 @@ import mujoco
 import numpy as np
 
 from compass_ros.cells.made_drives import Writer, command, strength, whole_command
+from compass_ros.cells.made_inertias import deformed, moments
 from compass_ros.errors import ConfigError
 from compass_ros.types import Floats
 
@@ -49,6 +51,7 @@ class Made:
 ELEMENT = {
     "body_mass": "body",
     "body_moment": "body",
+    "inertia_log_cholesky": "body",
     "body_turn": "body",
     "geom_turn": "geom",
     "inertia_turn": "body",
@@ -62,6 +65,9 @@ ELEMENT = {
 """Kind of the element of each made field."""
 TURNED = {"geom_turn": "geom_quat", "body_turn": "body_quat", "inertia_turn": "body_iquat"}
 """The quaternions that are turned."""
+WHOLE = "inertia_log_cholesky"
+PARTS = {"body_mass", "body_moment", "inertia_turn", "body_ipos", "body_inertia", "body_iquat"}
+"""What says a part of what that says."""
 
 
 def early_writers(scene: mujoco.MjModel, made: Sequence[Made], where: str) -> list[Writer]:
@@ -69,10 +75,11 @@ def early_writers(scene: mujoco.MjModel, made: Sequence[Made], where: str) -> li
     masses = [_mass(scene, m) for m in made if m.name == "body_mass"]
     zeros = [_zero(scene, m) for m in made if m.name == "joint_zero"]
     moments = [_moments(scene, body, made) for body in sorted({m.row for m in made if m.name == "body_moment"})]
+    whole = [_whole(scene, body, made, where) for body in sorted({m.row for m in made if m.name == WHOLE})]
     scaled, driven = ([m for m in made if m.name == name] for name in ("command_scale", "servo_gain"))
     gains = [whole_command(scene, m.row, f"{where}: {m.name}") for m in scaled]
     strengths = [strength(scene, m.row, m.column, f"{where}: {m.name}") for m in driven]
-    return masses + zeros + moments + gains + strengths
+    return masses + zeros + moments + whole + gains + strengths
 
 
 def late_writers(scene: mujoco.MjModel, made: Sequence[Made], where: str) -> list[Writer]:
@@ -92,15 +99,6 @@ def _mass(scene: mujoco.MjModel, made: Made) -> Writer:
     return write
 
 
-def moments(inertia: Floats) -> Floats:
-    """(3,) second moments of a mass along its principal axes [kg m^2]: the integral of x^2 dm, ...; none is negative.
-
-    Of (3,) principal inertias. No other numbers belong to a real body: that they are positive says the same as that no
-    inertia is more than the sum of the other two (Wensing et al., IEEE RA-L 3(1), 2018).
-    """
-    return np.asarray(np.maximum(0.5 * inertia.sum() - inertia, 0.0))
-
-
 def _moments(scene: mujoco.MjModel, body: int, made: Sequence[Made]) -> Writer:
     own = [m for m in made if m.name == "body_moment" and m.row == body]
     inertia = scene.body_inertia[body].copy()
@@ -112,6 +110,11 @@ def _moments(scene: mujoco.MjModel, body: int, made: Sequence[Made]) -> Writer:
         model.body_inertia[body] = inertia + (more.sum() - more)
 
     return write
+
+
+def _whole(scene: mujoco.MjModel, body: int, made: Sequence[Made], where: str) -> Writer:
+    own = [m for m in made if m.name == WHOLE and m.row == body]
+    return deformed(body, scene, [m.column for m in own], [m.index for m in own], where)
 
 
 def _zero(scene: mujoco.MjModel, made: Made) -> Writer:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from functools import lru_cache
+from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.fields import names
+from compass_ros.cells.scene_source import scene_source
 from compass_ros.cells.sensors import add_sensors
 from compass_ros.cells.signals import Signal
 from compass_ros.cells.spec import ParameterSpec
@@ -39,7 +41,7 @@ def _model(
 ) -> tuple[mujoco.MjModel, Ints]:
     """A scene's model, not to be changed; `content`: hash of its files. Raises ConfigError."""
     try:
-        spec = mujoco.MjSpec.from_file(path)
+        spec = scene_source(Path(path)).spec
         if signals:
             add_sensors(spec, _model(path, content)[0], signals, where)
         for name in simple:
@@ -58,7 +60,7 @@ def _tuned_though_simple(nominal: mujoco.MjModel, parameters: Sequence[Parameter
     tuned: list[str] = []
     for p in parameters:
         of = [one.strip() for one in p.of.split(",")]
-        if p.field.startswith(("body_ipos", "body_iquat", "inertia_turn")):
+        if p.field.startswith(("body_ipos", "body_iquat", "inertia_turn", "inertia_log_cholesky")):
             tuned += of
         elif p.field.startswith(("jnt_pos", "jnt_axis")):
             found = [mujoco.mj_name2id(nominal, mujoco.mjtObj.mjOBJ_JOINT, one) for one in of]

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from compass_ros.cells import Cell
+from compass_ros.cells.scene_source import missing_meshes
 from compass_ros.types import Episode, Track
 
 FEW = 8
@@ -21,7 +22,7 @@ def doubts(cell: Cell, episodes: Sequence[Episode]) -> tuple[str, ...]:
     """One sentence each; empty when nothing is odd."""
     said = [_few(episodes), _alike(episodes)]
     said += [_unmoved(spec.name, episodes) for spec in cell.objects]
-    said += _remarks(episodes)
+    said += [missing_meshes(cell.model_path), *_remarks(episodes)]
     return tuple(filter(None, said))
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from compass_ros.cells import Cell
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.cells.scene_files import SceneFiles, scene_files
+from compass_ros.cells.scene_source import scene_source
 from compass_ros.simulation.effects import FittedEffect, write_effects
 from compass_ros.simulation.native.program import mujoco_library, save_numbers
 from compass_ros.simulation.simulator import Simulator
@@ -31,7 +32,7 @@ def write_scene(cell: Cell, values: Floats, path: Path) -> None:
     Its meshes, textures, height fields and skins are copied into the folder `FILES` beside it. What is no field of a
     model (the speed that an arm reaches, a camera's bias) stays in result.json.
     """
-    spec = mujoco.MjSpec.from_file(str(cell.model_path))
+    spec = scene_source(cell.model_path).spec
     spec.compiler.saveinertial = True  # else MuJoCo computes masses from the drawing again
     spec.comment = spec.comment.replace("--", "- -")  # MuJoCo reads that, XML has no such comment
     model = _calibrated(spec, cell, values)

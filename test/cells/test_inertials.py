@@ -12,7 +12,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from compass_ros.cells import Cell, load
-from compass_ros.cells.made_fields import moments
+from compass_ros.cells.made_inertias import moments
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.simulation.export import write_scene
 from compass_ros.types import Floats
