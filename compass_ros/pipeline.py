@@ -18,6 +18,7 @@ from compass_ros.calibration.methods import compass_config, method
 from compass_ros.calibration.noise import Noise, measure_noise
 from compass_ros.calibration.problem import Allowance, Problem
 from compass_ros.calibration.refine import Refined, refine, with_launches
+from compass_ros.calibration.safeguard import farther
 from compass_ros.cells import Cell
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery, discover, fit_failed, not_evaluated
@@ -28,7 +29,7 @@ from compass_ros.progress import Steady
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.factors import factor_distance
 from compass_ros.simulation.manifold import apart, charted, on_manifold
-from compass_ros.simulation.replay import Recordings, Replay, recordings, rms_distance
+from compass_ros.simulation.replay import Recordings, Replay, floored, recordings, rms_distance
 from compass_ros.simulation.windows import windows
 from compass_ros.types import (
     Budget,
@@ -72,7 +73,8 @@ def calibrate(
         judge = judge.numbered(len(data.names))
         simulator = simulator.driven(data.drives + judge.drives)
         noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
-        problem, unseen = pose(simulator, data, noise), pose(simulator, judge, noise).likelihood
+        yardsticks = Yardstick(simulator, data, noise), Yardstick(simulator, judge, noise)
+        problem, unseen = pose(simulator, data, noise, yardsticks[0]), pose(simulator, judge, noise).likelihood
 
         estimate, refined = estimate_parameters(problem, config, steady.share(0.0, first))
         if not config.discover:
@@ -80,7 +82,8 @@ def calibrate(
             break
         if keep is not None:
             begun = not_evaluated("the search has not ended")
-            keep(assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, begun), begun)
+            known = assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, begun, yardsticks)
+            keep(known, begun)
         may_turn = turn == 0 and 0 < 2 * len(held_out) <= len(used)
         rest = steady.share(first, 1.0)
         found = searched(simulator, problem, estimate, refined, unseen, noise, config.seed, may_turn, rest)
@@ -90,7 +93,9 @@ def calibrate(
             f"what fits the other episodes to the noise does not predict {', '.join(judge.names)}: these are fitted, "
             "others are held out"
         )
-    result = assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, found)
+    result = assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, found, yardsticks)
+    if estimate.note:
+        told.append(estimate.note)
     if len(used) < len(episodes):
         said = f"{len(used)} of {len(episodes)} episodes were used, evenly over the order of recording"
         told.append(f"{said}; the option `episodes` takes more")
@@ -151,7 +156,34 @@ def split(episodes: Sequence[Episode], config: CalibrationConfig, turn: int = 0)
     return [e for e in ordered if e.name not in chosen], [e for e in ordered if e.name in chosen]
 
 
-def pose(simulator: Simulator, data: Recordings, noise: Noise) -> Problem:
+class Yardstick:
+    """How far a simulator is from recordings, as it is reported; what was asked once is not simulated again."""
+
+    def __init__(self, simulator: Simulator, data: Recordings, noise: Noise) -> None:
+        self._asked = (simulator, data, noise)
+        self._known: dict[bytes, tuple[Replay, Gap]] = {}
+
+    def replay(self, values: Floats) -> Replay:
+        """Of (P,) values, each episode with the launch that agrees best with it."""
+        return self._at(values)[0]
+
+    def gap(self, values: Floats, noise: Floats) -> Gap:
+        """As `Replay.gap` has it."""
+        return floored(self._asked[0], self._at(values)[1], noise)
+
+    def distance(self, values: Floats) -> float:
+        """rms distance [m or rad]."""
+        return self._at(values)[1].rmse_m
+
+    def _at(self, values: Floats) -> tuple[Replay, Gap]:
+        key = values.tobytes()
+        if key not in self._known:
+            replay = launched(*self._asked, values)
+            self._known[key] = replay, replay.gap(values)
+        return self._known[key]
+
+
+def pose(simulator: Simulator, data: Recordings, noise: Noise, yardstick: Yardstick | None = None) -> Problem:
     """Recordings and a simulator as the problem that every method is given."""
     cell = simulator.cell
     replay = Replay(simulator, data)
@@ -181,12 +213,22 @@ def pose(simulator: Simulator, data: Recordings, noise: Noise) -> Problem:
         start=simulator.defaults,
         simulated_seconds=cell.duration,
         apart=partial(factor_distance, cell),
+        distance=(yardstick or Yardstick(simulator, data, noise)).distance,
         likelihood=likelihood,
     )
 
 
 def estimate_parameters(problem: Problem, config: CalibrationConfig, report: Report) -> tuple[Estimate, Refined | None]:
-    """Run the configured method; ours hands on the fit that it ends with."""
+    """Run the configured method; ours hands on the fit that it ends with. No answer is farther than the start."""
+    estimate, refined = _estimate(problem, config, report)
+    distance, found, begun = problem.distance, estimate.values, problem.start
+    if distance(found) > distance(begun):
+        note = farther(distance, found, begun, begun)
+        return replace(estimate, values=begun, std=np.full(len(begun), np.nan), note=note), None
+    return estimate, refined
+
+
+def _estimate(problem: Problem, config: CalibrationConfig, report: Report) -> tuple[Estimate, Refined | None]:
     if config.method in ("default", "causal-map"):
         return causal_map_refined(problem, report)
     compass = config.compass
@@ -214,8 +256,9 @@ def assemble(
     noise: Noise,
     estimate: Estimate,
     found: Discovery,
+    yardsticks: tuple[Yardstick, Yardstick] | None = None,
 ) -> Result:
-    """Gaps on all episodes for each model, tables and drawings."""
+    """Gaps on all episodes for each model, tables and drawings. `yardsticks`: of what is fitted, of what judges."""
     values = found.parameters if found.parameters is not None else estimate.values
     alone = np.full(len(values), np.nan) if found.parameters is None else estimate.values
     std, identifiable = estimate.std, estimate.identifiable
@@ -225,12 +268,12 @@ def assemble(
     models = {"nominal": (simulator, simulator.defaults), "calibrated": (simulator, estimate.values)}
     if found.simulator is not None and found.values is not None:
         models["with_effects"] = (found.simulator, found.values)
-    replays = {name: (launched(s, data, noise, v), launched(s, judge, noise, v), v) for name, (s, v) in models.items()}
-    own = (found.noise or noise).rms
-    gap: dict[str, dict[str, Gap]] = {
-        name: {"fit": fit.gap(v, own)} | ({"held_out": unseen.gap(v, own)} if held_out else {})
-        for name, (fit, unseen, v) in replays.items()
-    }
+    own, replays, gap = (found.noise or noise).rms, {}, dict[str, dict[str, Gap]]()
+    of_cell = yardsticks or (Yardstick(simulator, data, noise), Yardstick(simulator, judge, noise))
+    for name, (s, v) in models.items():
+        fit, unseen = of_cell if s is simulator else (Yardstick(s, data, noise), Yardstick(s, judge, noise))
+        replays[name] = fit.replay(v), unseen.replay(v), v
+        gap[name] = {"fit": fit.gap(v, own)} | ({"held_out": unseen.gap(v, own)} if held_out else {})
     floor = noise_floor(cell, found.noise or noise)
     graph = estimate.graph or Graph(
         tuple(p.name for p in cell.parameters),

@@ -266,6 +266,8 @@ class Estimate:
     stop_reason: str
     """One sentence: why it stopped."""
     together: tuple[Together, ...] = ()
+    note: str = ""
+    """What else a user should know of these values; empty where nothing."""
 
 
 @dataclass(frozen=True)

@@ -168,6 +168,21 @@ def test_what_the_fitted_episodes_do_not_show_is_fitted_next(
     assert any(f"does not predict {names}: these are fitted, others are held out" in w for w in result.warnings)
 
 
+@pytest.mark.parametrize("name", ["compass", "npdr", "exi-net", "tune-net", "mujoco-sysid", "cma-es", "random"])
+def test_no_method_ends_farther_than_it_began(
+    episodes: list[Episode], monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """Whatever it returns; the same numbers stand as nominal and as calibrated then, and it is said."""
+    far = cell().values({"pusher@actuation@vel_discount": 0.5})
+    sure = np.zeros(len(far), dtype=bool)
+    bad = Estimate(name, far, 0.01 * np.abs(far), sure, None, (), 0, True, "done")
+    monkeypatch.setattr(pipeline, "_estimate", lambda *_: (bad, None))
+    result, _ = calibrate(episodes, cell(), replace(CONFIG, method=name))
+    assert found(result) == cell().defaults.tolist()
+    assert result.gap["calibrated"] == result.gap["nominal"]
+    assert result.warnings[0].endswith("the defaults stay")
+
+
 def test_a_stop_is_said(episodes: list[Episode]) -> None:
     def stop(progress: Progress) -> bool:
         return False

@@ -19,6 +19,7 @@ from compass_ros.calibration.identifiability import IDENTIFIED, together
 from compass_ros.calibration.least_squares import Point, start
 from compass_ros.calibration.problem import Allowance, Problem
 from compass_ros.calibration.refine import COARSE, Refined, refine, standard_errors
+from compass_ros.calibration.safeguard import farther, no_farther
 from compass_ros.types import Estimate, Floats, Graph, Iteration, Progress, Report
 
 EDGE_SHARE = 0.003
@@ -54,8 +55,14 @@ def causal_map_refined(problem: Problem, report: Report) -> tuple[Estimate, Refi
     watch("screen", 0.0, start(problem.likelihood, problem.start))
     known = problem.likelihood
     alike = known.predict_alike and counted(known.predict_alike)
-    refined = refine(replace(known, predict=counted(known.predict), predict_alike=alike), problem.start, watch)
-    return to_estimate(problem, refined, tuple(trace)), refined
+    likelihood = replace(known, predict=counted(known.predict), predict_alike=alike)
+    refined = refine(likelihood, problem.start, watch)
+    kept = no_farther(likelihood, refined, problem.start, problem.distance)
+    if kept is refined:
+        return to_estimate(problem, refined, tuple(trace)), refined
+    watch("refine", 1.0, kept.fit.point)
+    note = farther(problem.distance, refined.fit.point.values, kept.fit.point.values, problem.start)
+    return replace(to_estimate(problem, kept, tuple(trace)), note=note), kept
 
 
 def to_estimate(problem: Problem, refined: Refined, trace: tuple[Iteration, ...]) -> Estimate:

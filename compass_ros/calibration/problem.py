@@ -34,6 +34,8 @@ class Problem:
     """Length of one rollout."""
     apart: Callable[[Floats, Floats], Floats]
     """(..., C) observations, the same -> (..., K) how far apart by factor [m or rad]."""
+    distance: Callable[[Floats], float]
+    """(P,) -> rms distance from the recordings as it is reported [m or rad]; what was asked once is not simulated."""
     likelihood: Likelihood
     """The same recordings with their noise and prior, for methods that look into the episodes."""
 

@@ -161,16 +161,20 @@ def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True)
     What is felt is asked here and not at the start, from where a puck may never have reached some wall.
     """
     influence, fit = freed(likelihood, point, 3)
-    felt = fit.free
     watch("refine", 0.85, fit.point)
     rough = with_roughness(likelihood, fit)
     linear = scaled(fit.linear, likelihood, rough)
     smooth = likelihood.windowed and bool(np.max(rough.sigma / likelihood.sigma) < SMOOTH)
     fit = settled(rough, replace(fit, linear=linear, robust=ROBUST), rounds=1 if smooth else 2)
     watch("refine", 1.0, fit.point)
-    spread = covariance(rough, fit)
+    return concluded(rough, fit, influence)
+
+
+def concluded(rough: Likelihood, fit: Fit, influence: Influence) -> Refined:
+    """A fit with its errors; `rough`: the likelihood whose sigma holds the simulator's roughness."""
+    spread, felt = covariance(rough, fit), fit.free
     own = alone(spread[: len(felt), : len(felt)])
-    if many(likelihood):
+    if many(rough):
         share, factor = information_share(rough, fit), np.ones(len(spread))
         factor[: len(felt)] = coupling(influence.gram, felt, share)
         spread = spread * np.outer(factor, factor)

@@ -171,13 +171,18 @@ class Replay:
         tiled = np.tile(values, (len(episodes), 1))
         d = self.differences(tiled, episodes).mean(axis=0)
         cell = self.simulator.cell
-        missed = apart(cell, self.predict(tiled, episodes), charted(cell, self.data.measured))
+        measured = charted(cell, self.data.measured)
+        missed = apart(cell, self.predict(tiled, episodes), measured)
+        missed = np.where(np.isnan(missed) & ~np.isnan(measured), np.inf, missed)  # a simulator that lost the body
         of_factor = dict(zip([f.name for f in cell.factors], d.tolist(), strict=True))
-        signals = by_signal(self.simulator, missed)
-        if noise is not None:
-            floors = by_signal(self.simulator, on_manifold(cell, noise)[None, None])
-            signals = {name: replace(signal, floor=floors[name].rms) for name, signal in signals.items()}
-        return Gap(of_factor, rms_distance(cell, missed), signals)
+        gap = Gap(of_factor, rms_distance(cell, missed), by_signal(self.simulator, missed))
+        return gap if noise is None else floored(self.simulator, gap, noise)
+
+
+def floored(simulator: Simulator, gap: Gap, noise: Floats) -> Gap:
+    """The same with what the (C,) noise alone would leave of each signal."""
+    floors = by_signal(simulator, on_manifold(simulator.cell, noise)[None, None])
+    return replace(gap, signals={name: replace(s, floor=floors[name].rms) for name, s in gap.signals.items()})
 
 
 def rms_distance(cell: Cell, missed: Floats) -> float:

@@ -50,6 +50,7 @@ class Meter:
             start=np.zeros(len(world.parameters)),
             simulated_seconds=1.0,
             apart=lambda one, other: np.abs(one - other),
+            distance=lambda values: 0.0,
             likelihood=likelihood,
         )
 

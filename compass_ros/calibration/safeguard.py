@@ -1,0 +1,59 @@
+"""A fit that ends farther from the recordings than it began is none.
+
+What is fitted and what is reported differ: the loss hardly counts what it takes for outliers, frames after a collision
+that amplifies everything are trusted less, and the fit follows its solution from the beginning of each episode. Where
+something else differs than the parameters, in chaotic bounces above all, that can end farther away in root mean square,
+the distance that is reported. So that distance is asked of the fit and of where it began. The start is one of the
+answers: by construction none is farther.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from compass_ros.calibration.least_squares import Point, start
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.refine import (
+    ROBUST,
+    Refined,
+    calmed,
+    concluded,
+    freed,
+    polish,
+    scaled,
+    with_launches,
+    with_roughness,
+)
+from compass_ros.types import Floats
+
+Distance = Callable[[Floats], float]
+"""(P,) values -> how far they are from the recordings, as it is reported."""
+
+
+def no_farther(likelihood: Likelihood, refined: Refined, values: Floats, distance: Distance) -> Refined:
+    """A fit that is not farther than the (P,) values where it began: this one; else one that begins there with whole
+    episodes, which has no beginning of theirs to be led astray by; else those values, with the errors that they have.
+    """
+    if not distance(refined.fit.point.values) > distance(values):
+        return refined
+    begun = freed(likelihood, start(likelihood, values), 0)[1]
+    calm = calmed(likelihood, begun.linear)
+    whole = polish(calm, begun.point)
+    if not distance(whole.fit.point.values) > distance(values):
+        return whole
+    return _stayed(calm, with_launches(calm, values))
+
+
+def farther(distance: Distance, reached: Floats, kept: Floats, begun: Floats) -> str:
+    """What a user is told of a fit that was not kept."""
+    times = [distance(values) / distance(begun) for values in (reached, kept)]
+    instead = f"one that begins with whole episodes is at {times[1]:.2f}" if times[1] < 1 else "the defaults stay"
+    return f"a fit ended {times[0]:.2f} times as far from the fitted episodes (rms) as the defaults are; {instead}"
+
+
+def _stayed(likelihood: Likelihood, point: Point) -> Refined:
+    """The errors at a point, without a step."""
+    influence, fit = freed(likelihood, point, 0)
+    rough = with_roughness(likelihood, fit)
+    return concluded(rough, replace(fit, linear=scaled(fit.linear, likelihood, rough), robust=ROBUST), influence)
