@@ -82,6 +82,11 @@ class CalibrationConfig:
     episodes: int = Field(
         default=100, ge=1, description="most episodes that are used; of more, so many are taken evenly over their order"
     )
+    windows: int = Field(
+        default=40,
+        ge=1,
+        description="most windows of long recordings that are fitted; of more, an even choice over their order",
+    )
     threads: int = Field(default=0, ge=0, description="threads for rollouts; 0: all cores. Results do not depend on it")
     compass: CompassConfig = Field(default_factory=CompassConfig)
 

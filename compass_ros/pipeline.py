@@ -69,7 +69,9 @@ def calibrate(
     told = []
     for turn in range(2):
         fit, held_out = split(used, config, turn)
-        data, judge = (recordings(cell, evenly(windows(cell, e), config.episodes)) for e in (fit, held_out or fit))
+        most = config.windows if cell.spec.windows else config.episodes
+        data = recordings(cell, evenly(windows(cell, fit), most))
+        judge = recordings(cell, evenly(windows(cell, held_out or fit), config.episodes))
         judge = judge.numbered(len(data.names))
         simulator = simulator.driven(data.drives + judge.drives)
         noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
