@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -181,6 +182,58 @@ def test_no_method_ends_farther_than_it_began(
     assert found(result) == cell().defaults.tolist()
     assert result.gap["calibrated"] == result.gap["nominal"]
     assert result.warnings[0].endswith("the defaults stay")
+
+
+def raising(error: Exception) -> Callable[..., Discovery]:
+    def discover(*_: object) -> Discovery:
+        raise error
+
+    return discover
+
+
+@pytest.mark.parametrize(
+    ("step", "error", "verdict", "says"),
+    [
+        ("discover", DataError("only 3 shots were found"), "not_evaluated", "only 3 shots were found"),
+        ("discover", np.linalg.LinAlgError("Singular matrix"), "fit_failed", "Singular matrix"),
+        ("unexpected", np.linalg.LinAlgError("SVD did not converge"), "fit_failed", "SVD did not converge"),
+        ("refine", np.linalg.LinAlgError("Singular matrix"), "fit_failed", "no solution"),
+        ("refine", DataError("the episodes say nothing"), "not_evaluated", "the episodes say nothing"),
+    ],
+)
+def test_a_search_that_cannot_be_done_leaves_the_calibration(
+    episodes: list[Episode],
+    result: Result,
+    monkeypatch: pytest.MonkeyPatch,
+    step: str,
+    error: Exception,
+    verdict: str,
+    says: str,
+) -> None:
+    monkeypatch.setattr(pipeline, "refine", lambda *_: None)
+    monkeypatch.setattr(pipeline, "unexpected", lambda *_: False)
+    monkeypatch.setattr(pipeline, step, raising(error))
+    ended, _ = calibrate(episodes, cell(), replace(CONFIG, discover=True))
+    assert found(ended) == found(result)
+    assert (ended.mismatch.verdict, "\n" in ended.mismatch.sentence) == (verdict, False)
+    assert says in ended.mismatch.sentence
+
+
+@pytest.mark.parametrize("error", [RuntimeError("a bug"), KeyboardInterrupt(), MemoryError()])
+def test_what_was_calibrated_is_handed_out_before_the_search(
+    episodes: list[Episode], result: Result, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    """Whatever ends the search, a bug, the user or the machine: nothing that was computed is lost."""
+    kept: list[Result] = []
+    monkeypatch.setattr(pipeline, "refine", lambda *_: None)
+    monkeypatch.setattr(pipeline, "unexpected", lambda *_: False)
+    monkeypatch.setattr(pipeline, "discover", raising(error))
+    with pytest.raises(type(error)):
+        calibrate(episodes, cell(), replace(CONFIG, discover=True), keep=lambda r, _: kept.append(r))
+    assert found(kept[0]) == found(result)
+    assert kept[0].gap == result.gap
+    assert kept[0].mismatch.verdict == "not_evaluated"
+    assert "the search has not ended" in kept[0].mismatch.sentence
 
 
 def test_a_stop_is_said(episodes: list[Episode]) -> None:

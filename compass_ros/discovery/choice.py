@@ -139,8 +139,11 @@ class Choice:
 
 
 def comes_to(joint: Joint, simpler: Joint) -> bool:
-    """Whether a model says no more than a simpler one that it comes to at an end of its shapes."""
-    return joint.added[0].effect.limit == simpler.name and worth(simpler) - worth(joint) < OF_LIMIT
+    """Whether a model says no more than a simpler one that it comes to at an end of the shapes of one of its laws."""
+    own, others = ({a.effect.name: a.effect.limit for a in j.added} for j in (joint, simpler))
+    apart = [limit for name, limit in own.items() if name not in others]
+    limits = len(own) == len(others) and len(apart) == 1 and apart[0] in others.keys() - own.keys()
+    return limits and worth(simpler) - worth(joint) < OF_LIMIT
 
 
 def evidence(joint: Joint, unseen: HeldOut) -> float:

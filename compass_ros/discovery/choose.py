@@ -143,7 +143,7 @@ def _in_pairs(choice: Choice, space: Space, candidates: Sequence[Candidate], uns
     for way in ways:
         if not _enough(choice, pairs, unseen):
             pairs += way()
-    pair = max(pairs, key=lambda p: evidence(p, unseen))
+    pair = simplest(sorted(pairs, key=lambda p: -evidence(p, unseen)))
     if not choice.good(unseen) and pair is not led:
         choice = _with_each(pair, choice, space)
     if choice.good(unseen):
@@ -277,7 +277,7 @@ def _with_second(choice: Choice, candidates: Sequence[Candidate], unseen: HeldOu
 
 def _beside(first: Joint, pairs: Sequence[Joint], choice: Choice, unseen: HeldOut) -> Choice:
     """The same with the best of some pairs with the first effect, and whether there are two."""
-    pair = max(pairs, key=lambda p: evidence(p, unseen))
+    pair = simplest(sorted(pairs, key=lambda p: -evidence(p, unseen)))
     choice = replace(choice.shown_by(pair), pair=pair)
     predicts = unseen.beside(first).helps(pair)
     needed = choice.remainder(first) > SEEN or unseen.remainder(pair) < FORM_LEFT * unseen.remainder(first)

@@ -3,15 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from compass_ros.discovery.formula import Monomial, basis, effect_of, propose, regress
-from compass_ros.discovery.screen import Space
+from compass_ros.discovery.candidates import Candidate
+from compass_ros.discovery.formula import (
+    Formula,
+    Monomial,
+    Variables,
+    basis,
+    effect_of,
+    of_joint,
+    propose,
+    regress,
+    spelled,
+)
+from compass_ros.discovery.screen import Score, Space
+from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
+from compass_ros.simulation.sizes import unit_joint
 from compass_ros.types import Floats
 from test.discovery.planted import CALM, HELD_OUT, PUCKS, planned_space, recorded, space_of
+from test.simulation import robots
 from test.simulation.table import simulator
 
 SADDLE = Monomial(0, (0, 2, 0, 0, 0))
@@ -72,7 +87,86 @@ def test_a_formula_is_kept_because_held_out_shots_gain(space: Space) -> None:
     assert "not named" in found.sentence
     assert found.formula.terms == (SADDLE,)
     assert found.formula.coefficients[0] == pytest.approx(SIZE, rel=0.05)
+    assert "of the library" not in found.sentence
 
 
 def test_a_formula_that_held_out_shots_contradict_is_dropped(space: Space) -> None:
     assert propose(space, recorded(PLANTED, [-SIZE], HELD_OUT, seed=7)) is None
+
+
+def written(terms: list[Monomial], numbers: list[float], objects: tuple[str, ...]) -> Formula:
+    attached = Attached(effect_of(terms), objects)
+    score = Score(Candidate(attached), np.array(numbers), 1.0, np.empty(0))
+    return Formula(tuple(terms), np.array(numbers), 1.0, score)
+
+
+@pytest.mark.parametrize(
+    ("terms", "numbers", "laws"),
+    [
+        ([(2, 0, 0, 0, 0, 0)], [0.3], ["coulomb_friction"]),
+        ([(2, 0, 0, 0, 0, 1)], [0.3], ["viscous_drag"]),
+        ([(2, 0, 0, 0, 0, 2)], [0.5], ["quadratic_drag"]),
+        ([(0, 0, 0, 1, 0, 0), (1, 0, 0, 0, 1, 0)], [-0.3, -0.3], ["viscous_drag"]),
+        ([(0, 0, 0, 0, 0, 0)], [0.02], ["table_tilt"]),
+        ([(0, 0, 0, 0, 0, 0), (1, 0, 0, 0, 0, 0)], [0.02, -0.01], ["table_tilt"]),
+        ([(0, 0, 0, 0, 1, 0), (1, 0, 0, 1, 0, 0)], [-0.4, 0.4], ["magnus"]),
+        ([(2, 1, 0, 0, 0, 0), (2, 0, 1, 0, 0, 0)], [0.05, 0.1], ["friction_gradient"]),
+        ([(2, 0, 0, 0, 0, 0), (2, 0, 0, 0, 0, 2)], [0.1, 0.5], ["coulomb_friction", "quadratic_drag"]),
+        ([(2, 0, 0, 0, 0, 2)], [-0.5], []),
+        ([(0, 0, 2, 0, 0, 0)], [0.5], []),
+        ([(0, 0, 0, 1, 0, 0)], [-0.3], []),
+        ([(2, 0, 0, 0, 0, 3)], [0.5], []),
+    ],
+)
+def test_a_formula_that_is_a_law_of_the_library_is_told_by_its_name(
+    terms: list[tuple[int, int, int, int, int, int]], numbers: list[float], laws: list[str]
+) -> None:
+    given = [Monomial(component, tuple(powers)) for component, *powers in terms]  # type: ignore[arg-type]
+    assert spelled(planned_space(), written(given, numbers, PUCKS)) == laws
+
+
+@pytest.mark.parametrize("kind", ["hinge", "slide"])
+@pytest.mark.parametrize(
+    ("terms", "shares", "laws"),
+    [
+        ([(2, 0, 0)], [0.1], ["coulomb_friction"]),
+        ([(2, 0, 1)], [0.1], ["viscous_drag"]),
+        ([(2, 0, 2)], [0.1], ["quadratic_drag"]),
+        ([(0, 0, 0), (0, 1, 0)], [0.05, -0.1], ["spring"]),
+        ([(0, 1, 0)], [-0.1], ["spring"]),
+        ([(0, 1, 0)], [0.1], []),
+        ([(0, 3, 0)], [-0.1], []),
+        ([(2, 0, 1), (0, 1, 0)], [0.1, -0.1], ["viscous_drag", "spring"]),
+    ],
+)
+def test_so_is_one_on_a_joint(
+    tmp_path: Path, kind: str, terms: list[tuple[int, int, int]], shares: list[float], laws: list[str]
+) -> None:
+    cell = robots.robot(tmp_path, (kind,))
+    robot = Simulator(cell, threads=1)
+    space = robots.space_of(robot, robots.recorded(robot, [], [], robots.shots(cell, 3)))
+    of = of_joint(robot.joint_sizes(*space.told)["j0"])
+    given = [Monomial(component, (place, 0, 0, 0, speed), of) for component, place, speed in terms]
+    numbers = [share * of.largest / term.size for share, term in zip(shares, given, strict=True)]
+    assert spelled(space, written(given, numbers, ("j0",))) == laws
+
+
+def test_on_a_joint_it_is_written_in_what_the_joint_has(tmp_path: Path) -> None:
+    of: Variables = of_joint(unit_joint("hinge"))
+    assert [(m.name, m.unit) for m in basis(of)] == [
+        ("torque", "N m"),
+        ("torque_q", "N m rad^-1"),
+        ("torque_q2", "N m rad^-2"),
+        ("torque_q3", "N m rad^-3"),
+        ("slowing_torque", "N m"),
+        ("slowing_torque_speed", "N m rad^-1 s"),
+        ("slowing_torque_q", "N m rad^-1"),
+        ("slowing_torque_q_speed", "N m rad^-2 s"),
+        ("slowing_torque_q2", "N m rad^-2"),
+        ("slowing_torque_q2_speed", "N m rad^-3 s"),
+        ("slowing_torque_speed2", "N m rad^-2 s^2"),
+        ("slowing_torque_speed3", "N m rad^-3 s^3"),
+    ]
+    terms = [m for m in basis(of) if m.name in ("torque_q", "slowing_torque_speed2")]
+    text = written(terms, [-2.0, 0.1], ("j0",)).text
+    assert text == "torque = -2 q, slowing torque = +0.1 speed^2"

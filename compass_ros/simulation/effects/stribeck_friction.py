@@ -38,4 +38,5 @@ EFFECT = Effect(
     on=(*LYING, *JOINTS),
     forces=_forces,
     on_joint=_on_joint,
+    limit="coulomb_friction",
 )

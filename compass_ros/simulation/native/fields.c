@@ -58,7 +58,11 @@ static const Program* find(const mjModel* model) {
   return NULL;
 }
 
-void compass_init(ApplyFT function) { apply_ft = function; }
+// How many kinds of force there are: a library that was compiled from another source has other ones. 0 without them.
+int compass_init(ApplyFT function) {
+  apply_ft = function;
+  return SPRING;
+}
 
 // Gives a model its program. Returns 0 where it has one already, or where three quarters of the table are taken.
 int compass_register(const mjModel* model, const Program* program) {

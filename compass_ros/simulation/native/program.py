@@ -174,8 +174,9 @@ def _library() -> ctypes.PyDLL:
     library.compass_evaluate.argtypes = [ctypes.c_int64, *2 * [ctypes.c_void_p], ctypes.c_double, ctypes.c_void_p]
     library.compass_evaluate.restype = None
     library.compass_init.argtypes = [ctypes.c_void_p]
-    library.compass_init.restype = None
-    library.compass_init(ctypes.cast(mujoco_library().mj_applyFT, ctypes.c_void_p))
+    library.compass_init.restype = ctypes.c_int
+    if library.compass_init(ctypes.cast(mujoco_library().mj_applyFT, ctypes.c_void_p)) != max(Kind):
+        raise ConfigError(f"{path}: was compiled from another version of fields.c; run `make install`")
     callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
     mujoco.set_mjcb_passive(ctypes.cast(library.compass_passive, callback))
     return library

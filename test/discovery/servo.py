@@ -1,0 +1,69 @@
+"""A servo with a load, recorded as step responses with physics that its model lacks, in any unit of force."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from compass_ros.cells import Cell
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import Attached, effect
+from compass_ros.simulation.sizes import unit_joint
+from compass_ros.types import Episode, Track
+from test.cells.written import content, parameter, written
+
+START = 1_700_000_000_000_000_000
+NOISE = 5e-4
+TRUTH = {"axis@dyna@damping": 0.12, "axis@dyna@armature": 0.02}
+
+
+def servo(folder: Path, force: float = 1.0) -> Cell:
+    """A bar on a hinge under a position servo; `force`: newton metres in units of force."""
+    scene = f"""<mujoco><option timestep="0.001" integrator="implicitfast"/><worldbody>
+        <body name="horn"><joint name="axis" axis="0 1 0" damping="{0.1 * force}" armature="{0.018 * force}"/>
+        <geom type="box" size="0.1 0.01 0.005" pos="0.1 0 0" mass="{0.1 * force}"/></body></worldbody>
+        <actuator><position name="motor" joint="axis" kp="{6 * force}" kv="{0.1 * force}"/></actuator></mujoco>"""
+    action = [
+        {"name": "start", "unit": "rad", "low": -1.5, "high": 1.5, "field": "qpos", "of": "axis"},
+        {"name": "goal", "unit": "rad", "low": -1.5, "high": 1.5, "field": "ctrl", "of": "motor"},
+    ]
+    tuned = [
+        parameter("axis@dyna@damping", "dof_damping", "axis", 0.1 * force, 0.03 * force),
+        parameter("axis@dyna@armature", "dof_armature", "axis", 0.018 * force, 0.004 * force),
+    ]
+    for one in tuned:
+        one["bounds"] = [0.0, 10 * float(str(one["default"]))]
+    made = content([{"name": "axis", "quantity": "joint"}], tuned, action=action, noise_m=2 * NOISE, horizon=60)
+    return written(folder, scene, made)
+
+
+def on_axis(name: str) -> Attached:
+    """A law on the servo's joint."""
+    return Attached(effect(name).at(unit_joint("hinge")), ("axis",))
+
+
+def recorded(
+    cell: Cell, laws: Sequence[Attached], numbers: Sequence[float], force: float = 1.0, count: int = 12, seed: int = 5
+) -> list[Episode]:
+    """Steps of the command at 60 Hz, from a servo that has laws with numbers in units of `force`."""
+    rng = np.random.default_rng(seed)
+    steps = rng.uniform(-1.2, 1.2, (count, 2))
+    stamps = START + np.round(np.arange(0, 1.2, 1 / 60) * 1e9).astype(np.int64)
+    time = np.tile((stamps - START) * 1e-9, (count, 1))
+    truth = cell.values({name: force * value for name, value in TRUTH.items()})
+    simulator = Simulator(cell, laws, threads=1)
+    seen = simulator.observe(np.tile([*truth, *numbers], (count, 1)), steps, time)
+    seen = seen + rng.normal(0, NOISE, seen.shape)
+    return [
+        Episode(
+            name=f"step{i:02d}",
+            cell=cell.name,
+            cell_hash=cell.hash,
+            action={"start": float(steps[i, 0]), "goal": float(steps[i, 1])},
+            start_ns=START,
+            tracks=(Track("axis", "joint", stamps, seen[i]),),
+        )
+        for i in range(count)
+    ]
