@@ -101,7 +101,7 @@ class Choice:
         """Whether a model explains the fitted episodes and predicts the others, with laws that are what they say."""
         share = unseen.share(joint)
         predicts = share >= PREDICTS or (share >= FORM_SHARE and unseen.remainder(joint) < SMALL)
-        return self.enough(joint) and unseen.helps(joint) and predicts and not joint.stands_in and joint.distinct()
+        return self.enough(joint) and unseen.helps(joint) and predicts and not joint.stands_in and joint.distinct
 
     def complete(self) -> bool:
         """Whether a model leaves nothing of the fitted episodes: what it does not predict, only others can show."""

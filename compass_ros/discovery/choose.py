@@ -245,7 +245,7 @@ def _equals(best: Joint, choice: Choice, unseen: HeldOut) -> tuple[Joint, ...]:
         and top - evidence(joint, unseen) < margin
         and unseen.helps(joint)
         and not joint.stands_in
-        and joint.distinct()
+        and joint.distinct
     ]
     names = {best.name, *(joint.name for joint in equal)}
     return tuple(joint for joint in equal if joint.added[0].effect.limit not in names)

@@ -20,6 +20,7 @@ from compass_ros.discovery.maps import TableMap, residual_map
 from compass_ros.discovery.next_shot import next_experiment
 from compass_ros.discovery.null import Null
 from compass_ros.discovery.numerics import shift
+from compass_ros.discovery.pairs import needs_each
 from compass_ros.discovery.scatter import spreads
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.unknown import whereabouts
@@ -115,13 +116,13 @@ class Finding:
         """Named, ambiguous, unknown or failed."""
         for found in choice.verdicts(unseen):
             joint = from_second_start(found)
-            std = self._std(joint)
-            if joint.distinct(std):
-                return self.named(joint, std, choice, (choice.equal,) if len(joint.added) == 1 else ((), ()))
+            if joint.distinct and needs_each(joint, self.space):
+                return self.named(joint, choice, (choice.equal,) if len(joint.added) == 1 else ((), ()))
         return replace(self.unknown(choice, unseen), untaught=choice.complete() or choice.untaught(unseen))
 
-    def named(self, joint: Joint, std: Floats, choice: Choice, equal: tuple[tuple[Joint, ...], ...]) -> Discovery:
+    def named(self, joint: Joint, choice: Choice, equal: tuple[tuple[Joint, ...], ...]) -> Discovery:
         """One or two effects with values, errors and evidence."""
+        std = self._std(joint)
         movers = self.simulator.movers()
         findings, at = [], len(self.simulator.cell.parameters)
         for attached, equals in zip(joint.added, equal, strict=True):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import islice
 
 import numpy as np
@@ -20,6 +21,7 @@ from compass_ros.calibration.least_squares import (
 )
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import ROBUST, freed, growing, settled
+from compass_ros.calibration.residuals import jackknife
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, Quantity
@@ -62,29 +64,27 @@ class Joint:
         least, most = widths(quantities), np.array([q.most for q in quantities])
         return bool(np.any(((least > 0) & (numbers <= least)) | (numbers >= most)))
 
-    def distinct(self, std: Floats | None = None) -> bool:
-        """Whether each of its laws lies more than ERROR_BARS of its error bars from zero, all its amplitudes together.
+    @cached_property
+    def distinct(self) -> bool:
+        """Whether each of its laws lies more than ERROR_BARS from zero, all its amplitudes together.
 
-        (P + Q,) `std`: what else is known of the errors; at least what the noise leaves open counts. A scatter is
-        judged by its episodes.
+        Error bars as the noise leaves them, and as the episodes disagree. Along directions of which the recordings say
+        less than the prior nothing is judged: where only ratios show, all numbers are unsure by one common factor, and
+        none of them is near zero for that. A scatter is judged by its episodes.
         """
-        at, free = len(self.simulator.cell.parameters), self.fit.free
+        free, p = self.fit.free, len(self.fit.free)
         hessian, _ = normal_equations(self.likelihood, self.fit.point, self.fit.linear, free, self.fit.robust)
         prior = np.eye(len(hessian))
-        errors = np.linalg.inv((hessian - prior) / self.likelihood.correlation_time + prior)[: len(free), : len(free)]
-        units = self.likelihood.prior_std
+        errors = np.linalg.inv((hessian - prior) / self.likelihood.correlation_time + prior)[:p, :p]
+        told, axes = np.linalg.eigh(np.linalg.inv(errors) - np.eye(p))
+        axes = axes[:, told > 1.0]
+        away = ((self.fit.point.values - self.likelihood.prior_mean) / self.likelihood.prior_std)[free]
+        bars = [axes.T @ cov @ axes for cov in (errors, jackknife(self.likelihood, self.fit))]
+        at = len(self.simulator.cell.parameters)
         for attached in self.simulator.effects:
-            own = at + np.flatnonzero(attached.amplitudes)
+            own = np.isin(free, at + np.flatnonzero(attached.amplitudes))
             at += len(attached.effect.quantities)
-            found = np.flatnonzero(np.isin(free, own))
-            if attached.effect.scattered or not len(found):
-                continue
-            away = (self.fit.point.values / units)[free[found]]
-            inner = errors[np.ix_(found, found)]
-            if std is not None:  # the same correlations, with wider bars
-                wider = np.maximum((std / units)[free[found]] / np.sqrt(np.diag(inner)), 1.0)
-                inner = inner * np.outer(wider, wider)
-            if away @ np.linalg.solve(inner, away) < ERROR_BARS**2:
+            if not attached.effect.scattered and any(_within(away[own], axes[own] @ c @ axes[own].T) for c in bars):
                 return False
         return True
 
@@ -92,6 +92,11 @@ class Joint:
         """Laplace approximation in the prior's units, the data's part divided by the correlation time."""
         hessian, _ = normal_equations(self.likelihood, self.fit.point, self.fit.linear, self.fit.free, self.fit.robust)
         return -self.fit.point.cost / correlation_time - 0.5 * float(np.linalg.slogdet(hessian)[1])
+
+
+def _within(away: Floats, errors: Floats) -> bool:
+    """Whether (n,) amplitudes are within ERROR_BARS of zero, with their (n, n) errors."""
+    return bool(away @ np.linalg.lstsq(errors, away, rcond=None)[0] < ERROR_BARS**2) and bool(np.any(errors))
 
 
 def widths(quantities: Sequence[Quantity]) -> Floats:

@@ -11,7 +11,7 @@ from compass_ros.calibration.least_squares import Point, minimise
 from compass_ros.discovery.beginning import OF_TWINS, begun
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.choice import OF_LIMIT, Choice
-from compass_ros.discovery.joint import Joint, best_of, converge, widened, widths
+from compass_ros.discovery.joint import ERROR_BARS, Joint, best_of, converge, widened, widths
 from compass_ros.discovery.screen import Score, Space
 from compass_ros.discovery.tangents import screen
 from compass_ros.discovery.trials import TRIED, at_other_rates, different, further, sketched, worth
@@ -98,6 +98,17 @@ def one_of(pair: Joint, i: int, space: Space) -> Joint:
     free = np.concatenate([pair.fit.free[pair.fit.free < known], np.arange(known, len(values))])
     fit = minimise(likelihood, Point(values, old.launch, np.inf), free, 4, pair.fit.robust, 2.0, fresh=False)
     return Joint(simulator, likelihood, fit, (kept,))
+
+
+def needs_each(joint: Joint, space: Space) -> bool:
+    """Whether a model of two effects is worse without either: by as much as ERROR_BARS from zero come to.
+
+    The rest is fitted again from where the pair stands. So what a longer fit gained is not put down to an effect.
+    """
+    if len(joint.added) < 2 or any(attached.effect.scattered for attached in joint.added):
+        return True
+    least = 0.5 * ERROR_BARS**2 * joint.likelihood.correlation_time
+    return all(one_of(joint, i, space).fit.point.cost > joint.fit.point.cost + least for i in (0, 1))
 
 
 def _beyond(first: Joint, candidates: Sequence[Candidate]) -> tuple[Space, list[Score]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from compass_ros.discovery.joint import ERROR_BARS
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Channel, EffectFinding, Floats, Phase, Region, Unit, Where
 
@@ -58,14 +59,19 @@ def place(where: Where, flat: bool = True) -> str:
 
 
 def value_of(finding: EffectFinding, attached: Attached) -> str:
-    """The effect and its amplitudes: 'fan_field, strength 0.21 +- 0.01 m/s^2'."""
-    numbers = []
+    """The effect and its amplitudes: 'fan_field, strength 0.21 +- 0.01 m/s^2'.
+
+    A law that is clearly there and has wide error bars is known by its ratio to numbers of the scene.
+    """
+    numbers, wide = [], True
     for quantity in attached.effect.quantities:
         if quantity.amplitude:
             found = finding.parameters[quantity.name]
+            wide = wide and abs(found.value) < ERROR_BARS * found.std
             unit = "" if found.unit == "1" else f" {found.unit}"
             numbers.append(f"{quantity.name} {found.value:.3g} +- {found.std:.1g}{unit}")
-    return f"{finding.name}, {', '.join(numbers)}"
+    ratio = " (only its ratio to numbers of the scene shows)" if wide else ""
+    return f"{finding.name}, {', '.join(numbers)}{ratio}"
 
 
 def errors(before: float, after: float, floor: float, unit: Unit) -> str:

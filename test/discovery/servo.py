@@ -11,7 +11,7 @@ from compass_ros.cells import Cell
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, effect
 from compass_ros.simulation.sizes import unit_joint
-from compass_ros.types import Episode, Track
+from compass_ros.types import Episode, Floats, Track
 from test.cells.written import content, parameter, written
 
 START = 1_700_000_000_000_000_000
@@ -48,22 +48,28 @@ def recorded(
     cell: Cell, laws: Sequence[Attached], numbers: Sequence[float], force: float = 1.0, count: int = 12, seed: int = 5
 ) -> list[Episode]:
     """Steps of the command at 60 Hz, from a servo that has laws with numbers in units of `force`."""
-    rng = np.random.default_rng(seed)
-    steps = rng.uniform(-1.2, 1.2, (count, 2))
-    stamps = START + np.round(np.arange(0, 1.2, 1 / 60) * 1e9).astype(np.int64)
-    time = np.tile((stamps - START) * 1e-9, (count, 1))
+    steps = np.random.default_rng(seed).uniform(-1.2, 1.2, (count, 2))
     truth = cell.values({name: force * value for name, value in TRUTH.items()})
-    simulator = Simulator(cell, laws, threads=1)
-    seen = simulator.observe(np.tile([*truth, *numbers], (count, 1)), steps, time)
-    seen = seen + rng.normal(0, NOISE, seen.shape)
+    return noisy(Simulator(cell, laws, threads=1), [*truth, *numbers], steps, 1.2, NOISE, seed)
+
+
+def noisy(
+    simulator: Simulator, values: Sequence[float], inputs: Floats, seconds: float, noise: float, seed: int
+) -> list[Episode]:
+    """Episodes of joints at 60 Hz with white noise, from a cell whose inputs are its action."""
+    cell, count = simulator.cell, len(inputs)
+    stamps = START + np.round(np.arange(0, seconds, 1 / 60) * 1e9).astype(np.int64)
+    time = np.tile((stamps - START) * 1e-9, (count, 1))
+    seen = simulator.observe(np.tile(values, (count, 1)), inputs, time)
+    seen = seen + np.random.default_rng(seed).normal(0, noise, seen.shape)
     return [
         Episode(
             name=f"step{i:02d}",
             cell=cell.name,
             cell_hash=cell.hash,
-            action={"start": float(steps[i, 0]), "goal": float(steps[i, 1])},
+            action={a.name: float(x) for a, x in zip(cell.action, inputs[i], strict=True)},
             start_ns=START,
-            tracks=(Track("axis", "joint", stamps, seen[i]),),
+            tracks=tuple(Track(o.name, "joint", stamps, seen[i][:, [k]]) for k, o in enumerate(cell.objects)),
         )
         for i in range(count)
     ]

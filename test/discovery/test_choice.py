@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from compass_ros.calibration.least_squares import Fit, Point, linearise
+from compass_ros.calibration.least_squares import Fit, Point, linearise, minimise
 from compass_ros.calibration.refine import ROBUST
 from compass_ros.discovery.choice import Choice, undecided
 from compass_ros.discovery.joint import Joint, widened
+from compass_ros.discovery.pairs import needs_each
 from compass_ros.discovery.screen import Space
 from compass_ros.discovery.unseen import HeldOut, held_out
 from compass_ros.simulation.effects import EFFECTS, Attached
@@ -39,10 +42,10 @@ DRAG = Attached(EFFECTS["viscous_drag"], PUCKS)
 )
 def test_a_law_within_two_of_its_error_bars_of_zero_is_none(name: str, numbers: list[float], apart: bool) -> None:
     kind = EFFECTS[name]
-    found = joint(planned_space(), Attached(kind, PUCKS if kind.moves else ()), numbers)
-    assert found.distinct() is apart
-    wide = np.full(len(found.fit.point.values), 1e9)
-    assert not found.distinct(wide), "what else is known of its error counts"
+    attached = Attached(kind, PUCKS if kind.moves else ())
+    space = copy.copy(planned_space())
+    space.likelihood = recorded(attached, numbers)
+    assert joint(space, attached, numbers).distinct is apart
 
 
 def pair(space: Space, second: Attached, numbers: Sequence[float]) -> Joint:
@@ -94,6 +97,35 @@ def test_two_that_may_be_named_are(drag: tuple[Space, HeldOut]) -> None:
     unseen = held_out(recorded_with([DRAG, tilt], [0.3, *numbers], HELD_OUT, 1), space.likelihood, space.fit)
     both, alone = pair(space, tilt, numbers), joint(space, DRAG, [0.3])
     assert Choice((alone,), both, *_of(space), two=True).verdict(unseen) is both
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers"),
+    [
+        ("table_tilt", [1e-3, 0.0]),
+        ("magnus", [0.02]),
+        ("camera_scale", [1e-3]),
+        ("swirl", [0.01, 0.1, 0.05, 0.1, 0.5]),
+        ("actuation_delay", [2e-3]),
+    ],
+)
+def test_an_effect_without_which_the_rest_fits_as_well_is_not_needed(
+    drag: tuple[Space, HeldOut], name: str, numbers: list[float]
+) -> None:
+    """Its pair had the longer fit."""
+    space, _ = drag
+    kind = EFFECTS[name]
+    both = pair(space, Attached(kind, PUCKS if kind.moves else ()), numbers)
+    fit = minimise(both.likelihood, both.fit.point, both.fit.free, 6, both.fit.robust)
+    assert not needs_each(replace(both, fit=fit), space)
+
+
+def test_two_that_are_there_are_both_needed_and_one_alone_is() -> None:
+    tilt, numbers = Attached(EFFECTS["table_tilt"], PUCKS), [5e-3, -3e-3]
+    space = space_of(recorded_with([DRAG, tilt], [0.3, *numbers]))
+    both = pair(space, tilt, numbers)
+    assert needs_each(replace(both, fit=minimise(both.likelihood, both.fit.point, both.fit.free, 3, ROBUST)), space)
+    assert needs_each(joint(space, DRAG, [0.3]), space)
 
 
 def _of(space: Space) -> tuple[float, float]:
