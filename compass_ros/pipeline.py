@@ -20,8 +20,9 @@ from compass_ros.calibration.problem import Allowance, Problem
 from compass_ros.calibration.refine import Refined, refine, with_launches
 from compass_ros.calibration.safeguard import farther
 from compass_ros.cells import Cell
+from compass_ros.checks.check import check
 from compass_ros.config import CalibrationConfig
-from compass_ros.discovery import Discovery, discover, fit_failed, not_evaluated
+from compass_ros.discovery import Discovery, data_bad, discover, fit_failed, not_evaluated
 from compass_ros.discovery.floor import honest
 from compass_ros.discovery.unseen import unexpected
 from compass_ros.errors import DataError
@@ -63,7 +64,8 @@ def calibrate(
 
     The same episodes, cell and configuration give the same result, bit for bit. Wall time is for the caller to add.
     """
-    used, steady = evenly(episodes, config.episodes), Steady(report)
+    checked = check(cell, episodes)
+    used, steady = evenly(checked.episodes, config.episodes), Steady(report)
     first = CALIBRATION if config.discover else 1.0
     simulator = Simulator(cell, threads=config.threads)
     told = []
@@ -79,6 +81,9 @@ def calibrate(
         problem, unseen = pose(simulator, data, noise, yardsticks[0]), pose(simulator, judge, noise).likelihood
 
         estimate, refined = estimate_parameters(problem, config, steady.share(0.0, first))
+        if checked.bad:
+            found = data_bad(checked.sentence)
+            break
         if not config.discover:
             found = not_evaluated("it was switched off")
             break
@@ -98,10 +103,10 @@ def calibrate(
     result = assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, found, yardsticks)
     if estimate.note:
         told.append(estimate.note)
-    if len(used) < len(episodes):
-        said = f"{len(used)} of {len(episodes)} episodes were used, evenly over the order of recording"
+    if len(used) < len(checked.episodes):
+        said = f"{len(used)} of {len(checked.episodes)} episodes were used, evenly over the order of recording"
         told.append(f"{said}; the option `episodes` takes more")
-    return replace(result, warnings=(*told, *result.warnings)), found
+    return replace(result, warnings=(*told, *checked.said, *result.warnings)), found
 
 
 def searched(

@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "compass_ros"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
-STEPS = ("cells", "tracking", "episodes", "simulation", "calibration", "discovery", "policy", "reporting")
+STEPS = ("cells", "tracking", "episodes", "checks", "simulation", "calibration", "discovery", "policy", "reporting")
 JOINS = {
     "pipeline": 3,
     "results": 3,
@@ -66,6 +66,9 @@ PROGRAMS = {"concealed/blind.py"}
 
 NEIGHBOURS = {
     ("simulation", "cells"),
+    ("checks", "cells"),
+    ("checks", "simulation"),
+    ("checks", "calibration"),
     ("discovery", "cells"),
     ("discovery", "simulation"),
     ("discovery", "calibration"),

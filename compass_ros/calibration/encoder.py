@@ -16,12 +16,12 @@ from compass_ros.types import Floats
 ROOT_12 = float(np.sqrt(12.0))
 """Step over standard deviation of what rounding makes wrong: that of a uniform distribution."""
 _FEWEST = 20
-"""Changes from which a common spacing is found: by chance, their phases agree as below with probability exp(-16)."""
-_IN_PHASE = 0.9
-"""Mean cosine of the phases of differences on a lattice of this step; 0 +- 1 / sqrt(2 n) where there is none.
-
-Rayleigh's test (1919) gives exp(-n R^2) for n phases by chance. It leaves room for a rounding of 0.07 steps, as tables
+"""Changes from which a common spacing is found: by chance, their phases agree as below with probability exp(-19)."""
+_IN_PHASE = 0.98
+"""Mean cosine of the phases of differences, and of values, on a lattice of this step: rounding of 0.03 steps, as tables
 with few digits have it.
+
+Where there is no lattice it is 0 +- 1 / sqrt(2 n): Rayleigh's test (1919) gives exp(-n R^2) for n phases by chance.
 """
 _DIVISORS = (1, 2, 3, 4)
 """The smallest difference that occurs may be so many steps."""
@@ -47,7 +47,7 @@ def encoder_step(series: Sequence[Floats], finest: float) -> float:
     smallest = float(np.median(moved[(moved >= least) & (moved <= 1.2 * least)]))
     for divisor in _DIVISORS:
         step = _lattice(moved, smallest / divisor) if smallest / divisor >= finest else 0.0
-        if step >= finest and _rough(seen, step):
+        if step >= finest and _rough(seen, step) and all(_in_phase(one, step) for one in seen if len(one)):
             return step
     return 0.0
 
@@ -69,6 +69,12 @@ def _lattice(moved: Floats, guess: float) -> float:
         if reach >= moved[-1]:
             return step
         reach *= _GROWTH
+
+
+def _in_phase(one: Floats, step: float) -> bool:
+    """Whether (F,) values, and not only their differences, are on one lattice; a glitch in ten may be elsewhere."""
+    phase = np.exp(2j * np.pi * (one - one[0]) / step)
+    return bool(np.abs(np.mean(phase)) > 0.8 * _IN_PHASE)
 
 
 def _rough(seen: Sequence[Floats], step: float) -> bool:

@@ -102,7 +102,6 @@ def run(
     from compass_ros.cells import load
     from compass_ros.config import calibration_config
     from compass_ros.operation.current import read_usable
-    from compass_ros.operation.doubts import doubts
     from compass_ros.pipeline import calibrate as pipeline
     from compass_ros.progress import Steady
     from compass_ros.reporting import print_result
@@ -113,11 +112,10 @@ def run(
     cell = load(cell_name, validated.parameters)
     reading = read_usable(cell, bags)
     make_writable(out)  # now, and not after minutes of work
-    said = doubts(cell, reading.episodes)
 
     def write(result: Result, found: Discovery) -> Result:
         budget = replace(result.budget, wall_seconds=time.monotonic() - started)
-        result = replace(result, budget=budget, warnings=(*said, *result.warnings), left_out=reading.left_out)
+        result = replace(result, budget=budget, left_out=reading.left_out)
         write_all(result, found, cell, out, repeat)
         return result
 

@@ -77,6 +77,11 @@ def fit_failed(reason: str) -> Discovery:
     return Discovery(Mismatch("fit_failed", None, (), (), "", f"No verdict on missing physics: {reason}."))
 
 
+def data_bad(sentence: str) -> Discovery:
+    """No verdict, for the recordings are wrong."""
+    return Discovery(Mismatch("data_bad", None, (), (), "", sentence))
+
+
 @dataclass(frozen=True)
 class Finding:
     """What is known when the verdict is due."""

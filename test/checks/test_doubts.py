@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from compass_ros.cells import Cell, load
+from compass_ros.checks.doubts import doubts
 from compass_ros.operation.current import read
-from compass_ros.operation.doubts import doubts
 from compass_ros.types import Episode
 from test.nodes.recordings import record
 

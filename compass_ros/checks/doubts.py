@@ -13,15 +13,15 @@ from compass_ros.types import Episode, Track
 FEW = 8
 """Fewer episodes than this leave little to hold out."""
 _STILL = 6.0
-"""An object that stays within so many standard deviations of its median has not moved."""
-_STILL_M = 0.002
-"""The least such distance [m or rad]."""
+"""An object that stays within so many standard deviations of its median, as the sensor states them, has not moved."""
+_EXPECTED = 2.0
+"""The least such distance, in the noise that the cell expects."""
 
 
 def doubts(cell: Cell, episodes: Sequence[Episode]) -> tuple[str, ...]:
     """One sentence each; empty when nothing is odd."""
     said = [_few(episodes), _alike(episodes)]
-    said += [_unmoved(spec.name, episodes) for spec in cell.objects]
+    said += [_unmoved(spec.name, episodes, cell.spec.noise_m) for spec in cell.objects]
     said += [missing_meshes(cell.model_path), *_remarks(episodes)]
     return tuple(filter(None, said))
 
@@ -59,14 +59,14 @@ def _alike(episodes: Sequence[Episode]) -> str:
     )
 
 
-def _unmoved(name: str, episodes: Sequence[Episode]) -> str:
+def _unmoved(name: str, episodes: Sequence[Episode], expected: float) -> str:
     tracks = [track for episode in episodes for track in episode.tracks if track.object == name]
-    if not tracks or any(map(_moves, tracks)):
+    if not tracks or any(_moves(track, expected) for track in tracks):
         return ""
     return f"{name} never moves in {len(episodes)} episodes: nothing can be said about its parameters"
 
 
-def _moves(track: Track) -> bool:
+def _moves(track: Track, expected: float) -> bool:
     spread = np.abs(track.value - np.median(track.value, axis=0)).max()
-    limit = _STILL_M if track.std is None else max(_STILL * float(np.median(track.std)), _STILL_M)
+    limit = max(_STILL * float(np.median(track.std)) if track.std is not None else 0.0, _EXPECTED * expected)
     return bool(spread > limit)

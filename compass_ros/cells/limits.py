@@ -1,0 +1,38 @@
+"""What a cell's scene says of the numbers that are tracked: what they are, and how far they can go."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import mujoco
+import numpy as np
+
+from compass_ros.cells.cell import Cell
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Of one tracked object."""
+
+    kind: Literal["angle", "length"]
+    """A hinge's angle [rad]; a slide's or a body's position [m]."""
+    low: float
+    high: float
+    """Range of the joint; infinite where it has none, and for bodies."""
+
+
+def limits(cell: Cell, model: mujoco.MjModel) -> Mapping[str, Limits]:
+    """By the name of the object."""
+    return {o.name: _of_joint(model, o.body or o.name) if o.quantity == "joint" else _FREE for o in cell.objects}
+
+
+_FREE = Limits("length", -np.inf, np.inf)
+
+
+def _of_joint(model: mujoco.MjModel, name: str) -> Limits:
+    joint = model.joint(name)
+    hinge = joint.type[0] in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_BALL)
+    low, high = joint.range if model.jnt_limited[joint.id] else (-np.inf, np.inf)
+    return Limits("angle" if hinge else "length", float(low), float(high))
