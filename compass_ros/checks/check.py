@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from compass_ros.cells import Cell
-from compass_ros.cells.limits import limits
+from compass_ros.cells.limits import Limits, limits
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.checks.doubts import doubts
 from compass_ros.checks.finding import Finding
 from compass_ros.checks.signals import Signal, labels, signal
+from compass_ros.checks.units import units
 from compass_ros.checks.window import windows
 from compass_ros.errors import DataError
 from compass_ros.types import Episode, Track
@@ -55,22 +56,26 @@ class Checked:
 def check(cell: Cell, episodes: Sequence[Episode]) -> Checked:
     """Look at all recordings. Raises DataError where none of them holds a motion."""
     named = dict(zip(labels(episodes), episodes, strict=True))
-    signals = _signals(cell, named)
+    model = dynamics_of(cell).model
+    allowed = limits(cell, model)
+    signals = _signals(cell, named, allowed)
     mended = {
         name: replace(episode, tracks=tuple(_track(signals, name, track) for track in episode.tracks))
         for name, episode in named.items()
     }
-    found = windows(cell, mended, tuple(signals.values()))
-    findings = (*(one for s in signals.values() for one in s.findings), *_frames(cell, named), *found.findings)
+    findings = [one for s in signals.values() for one in s.findings] + _frames(cell, named)
+    if not any(one.severity == "bad" for one in findings):
+        findings += units(cell, mended, allowed, float(model.stat.extent))
+    found = windows(cell, mended, tuple(signals.values()), {name for one in findings for name in _wrong(one)})
+    findings += found.findings
     if len(found.still) == len(named) and not cell.action:
         raise DataError(f"no recording holds a motion: {found.findings[-1].sentence}")
     out = _left_out(tuple(named), findings, () if cell.action else found.still)
     used = tuple(episode for name, episode in found.episodes.items() if name not in out)
-    return Checked(used, out, findings, tuple(signals.values()), doubts(cell, used))
+    return Checked(used, out, tuple(findings), tuple(signals.values()), doubts(cell, used))
 
 
-def _signals(cell: Cell, named: Mapping[str, Episode]) -> dict[str, Signal]:
-    allowed = limits(cell, dynamics_of(cell).model)
+def _signals(cell: Cell, named: Mapping[str, Episode], allowed: Mapping[str, Limits]) -> dict[str, Signal]:
     out = {}
     for o in cell.objects:
         seen = [(name, track) for name, e in named.items() for track in e.tracks if track.object == o.name]
@@ -99,7 +104,12 @@ def _frames(cell: Cell, named: Mapping[str, Episode]) -> list[Finding]:
 
 def _left_out(names: tuple[str, ...], findings: Sequence[Finding], still: tuple[str, ...]) -> tuple[str, ...]:
     """Recordings that nothing is computed from: the still ones, and the wrong ones where enough others are sound."""
-    wrong = {name for one in findings if one.severity == "bad" for name in one.samples} | set(still)
+    wrong = {name for one in findings for name in _wrong(one)} | set(still)
     sound = len(names) - len(wrong)
     chosen = wrong if sound >= max(LEAST, len(wrong)) else set(still)
     return tuple(name for name in names if name in chosen)
+
+
+def _wrong(finding: Finding) -> tuple[str, ...]:
+    """Recordings that nothing may be concluded from."""
+    return tuple(finding.samples) if finding.severity == "bad" else ()

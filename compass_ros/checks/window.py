@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from compass_ros.cells import Cell
@@ -24,16 +24,18 @@ class Windows:
     findings: tuple[Finding, ...]
 
 
-def windows(cell: Cell, episodes: Mapping[str, Episode], signals: Sequence[Signal]) -> Windows:
+def windows(cell: Cell, episodes: Mapping[str, Episode], signals: Sequence[Signal], wrong: Collection[str]) -> Windows:
     """Move the start of passive recordings that begin before the motion to where it begins.
 
-    Where a command says when time 0 is, it stays, and so does a start whose state the recording states.
+    Where a command says when time 0 is, it stays, and so does a start whose state the recording states, and that of
+    recordings that are `wrong`.
     """
     late: dict[str, tuple[int, ...]] = {}
     out, still, longest = {}, [], 0.0
     for name, episode in episodes.items():
         series = [(one, signal.level) for signal in signals for one in signal.series if one.recording == name]
-        moved = episode if cell.action or episode.initial_state else _started(cell, episode, series)
+        stays = cell.action or episode.initial_state or name in wrong
+        moved = episode if stays else _started(cell, episode, series)
         if moved.start_ns != episode.start_ns:
             late[name] = ()
             longest = max(longest, (moved.start_ns - episode.start_ns) * _NS)
