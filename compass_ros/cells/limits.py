@@ -1,4 +1,4 @@
-"""What a cell's scene says of the numbers that are tracked: what they are, and how far they can go."""
+"""What a cell's scene says of the numbers that tell where something is: what they are, and how far they can go."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from compass_ros.cells.cell import Cell
 
 @dataclass(frozen=True)
 class Limits:
-    """Of one tracked object."""
+    """Of one joint, or of the position of one body."""
 
     kind: Literal["angle", "length"]
     """A hinge's angle [rad]; a slide's or a body's position [m]."""
@@ -23,12 +23,14 @@ class Limits:
     """Range of the joint; infinite where it has none, and for bodies."""
 
 
-def limits(cell: Cell, model: mujoco.MjModel) -> Mapping[str, Limits]:
-    """By the name of the object."""
-    return {o.name: _of_joint(model, o.body or o.name) if o.quantity == "joint" else _FREE for o in cell.objects}
-
-
-_FREE = Limits("length", -np.inf, np.inf)
+def limits(cell: Cell, model: mujoco.MjModel) -> Mapping[str, tuple[Limits, ...]]:
+    """By the name of each signal that says where something is: one for each of its joints, or one."""
+    free = Limits("length", -np.inf, np.inf)
+    return {
+        s.name: tuple(_of_joint(model, joint) for joint in s.at) if s.jointed else (free,)
+        for s in cell.signals
+        if s.places
+    }
 
 
 def _of_joint(model: mujoco.MjModel, name: str) -> Limits:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from compass_ros.cells import Cell
-from compass_ros.cells.limits import Limits, limits
+from compass_ros.cells.limits import limits
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.checks.doubts import doubts
 from compass_ros.checks.finding import Finding
-from compass_ros.checks.signals import Signal, labels, signal
+from compass_ros.checks.signals import LookedAt, Part, labels, look, parts, unlooked
 from compass_ros.checks.units import units
 from compass_ros.checks.window import windows
 from compass_ros.errors import DataError
@@ -29,7 +29,8 @@ class Checked:
     left_out: tuple[str, ...]
     """Names of the others."""
     findings: tuple[Finding, ...]
-    signals: tuple[Signal, ...]
+    signals: Mapping[str, LookedAt]
+    """By name, those that say where something is."""
     remarks: tuple[str, ...]
     """What is odd about the set as a whole, one sentence each."""
 
@@ -58,35 +59,38 @@ def check(cell: Cell, episodes: Sequence[Episode]) -> Checked:
     named = dict(zip(labels(episodes), episodes, strict=True))
     model = dynamics_of(cell).model
     allowed = limits(cell, model)
-    signals = _signals(cell, named, allowed)
-    mended = {
-        name: replace(episode, tracks=tuple(_track(signals, name, track) for track in episode.tracks))
-        for name, episode in named.items()
-    }
-    findings = [one for s in signals.values() for one in s.findings] + _frames(cell, named)
-    if not any(one.severity == "bad" for one in findings):
-        findings += units(cell, mended, allowed, float(model.stat.extent))
-    found = windows(cell, mended, tuple(signals.values()), {name for one in findings for name in _wrong(one)})
+    of = {name: tuple(parts(cell.signal(name), allowed[name], cell.spec.noise_m)) for name in allowed}
+    findings = units(cell, named, of, float(model.stat.extent)) + _frames(cell, named)
+    signals = _looked(named, of, {one.signal for one in findings if one.kind == "units"})
+    findings += [one for signal in signals.values() for one in signal.findings]
+    seen = [part for signal in signals.values() for part in signal.parts if not part.part.turns]
+    found = windows(cell, _mended(named, signals), seen, {name for one in findings for name in _wrong(one)})
     findings += found.findings
-    if len(found.still) == len(named) and not cell.action:
-        raise DataError(f"no recording holds a motion: {found.findings[-1].sentence}")
-    out = _left_out(tuple(named), findings, () if cell.action else found.still)
+    if len(found.still) == len(named) and not (cell.action or cell.spec.inputs):
+        raise DataError(f"no recording holds a motion: {findings[-1].sentence}")
+    out = _left_out(tuple(named), findings, found.still)
     used = tuple(episode for name, episode in found.episodes.items() if name not in out)
-    return Checked(used, out, tuple(findings), tuple(signals.values()), doubts(cell, used))
+    return Checked(used, out, tuple(findings), signals, doubts(cell, used))
 
 
-def _signals(cell: Cell, named: Mapping[str, Episode], allowed: Mapping[str, Limits]) -> dict[str, Signal]:
+def _looked(
+    named: Mapping[str, Episode], of: Mapping[str, Sequence[Part]], wrong: Collection[str]
+) -> dict[str, LookedAt]:
+    """Each signal; where the units of one of its parts are `wrong`, as it is."""
     out = {}
-    for o in cell.objects:
-        seen = [(name, track) for name, e in named.items() for track in e.tracks if track.object == o.name]
-        tracks = {name: track for name, track in seen if len(track.value) > 1}
+    for name, own in of.items():
+        seen = [(recording, track) for recording, e in named.items() for track in e.tracks if track.object == name]
+        tracks = {recording: track for recording, track in seen if len(track.value) > 1}
         if tracks:
-            out[o.name] = signal(o.name, tracks, allowed[o.name], cell.spec.noise_m)
+            out[name] = (unlooked if any(part.name in wrong for part in own) else look)(tracks, own)
     return out
 
 
-def _track(signals: Mapping[str, Signal], name: str, track: Track) -> Track:
-    return signals[track.object].tracks.get(name, track) if track.object in signals else track
+def _mended(named: Mapping[str, Episode], signals: Mapping[str, LookedAt]) -> dict[str, Episode]:
+    def of(recording: str, track: Track) -> Track:
+        return signals[track.object].tracks.get(recording, track) if track.object in signals else track
+
+    return {name: replace(e, tracks=tuple(of(name, track) for track in e.tracks)) for name, e in named.items()}
 
 
 def _frames(cell: Cell, named: Mapping[str, Episode]) -> list[Finding]:
@@ -107,7 +111,7 @@ def _left_out(names: tuple[str, ...], findings: Sequence[Finding], still: tuple[
     wrong = {name for one in findings for name in _wrong(one)} | set(still)
     sound = len(names) - len(wrong)
     chosen = wrong if sound >= max(LEAST, len(wrong)) else set(still)
-    return tuple(name for name in names if name in chosen)
+    return tuple(name for name in names if name in chosen and len(chosen) < len(names))
 
 
 def _wrong(finding: Finding) -> tuple[str, ...]:

@@ -62,8 +62,8 @@ def _parted(one: Series, level: Level) -> _Parted | None:
     if len(one.value) < 8:
         return None
     whole = _roughness(one, np.zeros(len(one.value), bool))
-    if not np.any(whole.max(axis=0) > level.apart):
-        return None
+    if _rms(whole, level) <= SMOOTHER * _rms(np.zeros_like(whole), level):
+        return None  # no split is smoother than noise
     for rarer in _splits(one, level):
         said = one.value[rarer]
         same = bool((said == said[0]).all())

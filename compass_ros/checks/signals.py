@@ -1,95 +1,140 @@
-"""Episodes as the checks see them, and back."""
+"""The signals of a cell as the checks see them: parts of one unit, and the recordings with what was mended."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from compass_ros.cells.limits import Limits
+from compass_ros.cells.signals import Signal
 from compass_ros.checks.finding import Finding
-from compass_ros.checks.frozen import frozen
+from compass_ros.checks.frozen import frozen, held
 from compass_ros.checks.interleaved import interleaved
-from compass_ros.checks.series import Kind, Level, Series, level
+from compass_ros.checks.series import Level, Series, level
 from compass_ros.checks.stamps import jumping_clock
 from compass_ros.checks.wrapped import unwrapped
-from compass_ros.types import Episode, Floats, Track
+from compass_ros.types import Episode, Track
 
 EXPECTED_TURN = 0.05
 """Noise of a quaternion's numbers that is expected of any sensor: a turn by six degrees."""
 
 
 @dataclass(frozen=True)
-class Signal:
-    """One tracked object in all recordings, mended where that is sure."""
+class Part:
+    """Numbers of one unit: a joint's position, the position of a body, its orientation."""
 
     name: str
-    tracks: Mapping[str, Track]
-    """By recording."""
+    first: int
+    """Column of a track."""
+    size: int
+    limits: Limits
+    expected: float
+    """Noise [unit of the numbers]."""
+    turns: bool = False
+    """Whether it is an orientation."""
+
+    @property
+    def columns(self) -> slice:
+        """Of a track."""
+        return slice(self.first, self.first + self.size)
+
+
+@dataclass(frozen=True)
+class Looked:
+    """One part in all recordings, after the checks."""
+
+    part: Part
     series: tuple[Series, ...]
-    """Its position or angle."""
     level: Level
     findings: tuple[Finding, ...]
 
 
-def signal(name: str, tracks: Mapping[str, Track], limits: Limits, expected: float) -> Signal:
-    """Look at all recordings of one object. `expected` [m or rad]: the noise that the cell expects.
+@dataclass(frozen=True)
+class LookedAt:
+    """One signal in all recordings."""
 
-    Where values of two kinds take turns, nothing else that jumps is looked for: it would be the same thing again.
+    tracks: Mapping[str, Track]
+    """By recording; mended where that is sure."""
+    parts: tuple[Looked, ...]
+    findings: tuple[Finding, ...]
+
+
+def parts(signal: Signal, limits: Sequence[Limits], expected: float) -> Iterator[Part]:
+    """The parts of a signal. `expected`: the noise that the cell expects, where the signal states none."""
+    noise = signal.noise or expected
+    if signal.jointed:
+        for i, number in enumerate(signal.numbers):
+            name = signal.name if signal.size == 1 else f"{signal.name}.{number}"
+            yield Part(name, i, 1, limits[i], noise)
+        return
+    yield Part(signal.name, 0, min(signal.size, 3), limits[0], noise)
+    if signal.quantity == "pose":
+        yield Part(f"orientation of {signal.name}", 3, 4, limits[0], EXPECTED_TURN, turns=True)
+
+
+def look(tracks: Mapping[str, Track], of: Sequence[Part]) -> LookedAt:
+    """Look at all recordings of one signal, by name, part by part.
+
+    Where values of two kinds take turns in one of them, nothing else that jumps is looked for in any: it would be the
+    same thing again.
     """
-    raw = [_place(recording, track, limits) for recording, track in tracks.items()]
-    strange = [one for one in interleaved(raw, level(raw, expected)) if one.kind in ("zeros", "constant")]
-    if strange:
-        return Signal(name, tracks, tuple(raw), level(raw, expected), (*strange, *_turned(tracks)))
-    whole = [_series(recording, track, "other", slice(None)) for recording, track in tracks.items()]
-    thawed = frozen(whole, level(whole, expected))
-    new = {one.recording: _with(tracks[one.recording], one) for one in thawed.series}
-    place = [_place(recording, track, limits) for recording, track in new.items()]
-    straight = unwrapped(place, level(place, expected))
-    new = {one.recording: _placed(new[one.recording], one.value) for one in straight.series}
-    known = level(straight.series, expected)
+    raw = [_unchecked(tracks, part) for part in of]
+    if strange := [
+        one for looked in raw for one in interleaved(looked.series, looked.level) if one.kind != "two series"
+    ]:
+        return LookedAt(tracks, tuple(raw), tuple(strange))
+    once, found = held(tracks, raw[0].level)
+    done = [_checked(once, part) for part in of]
+    mended = dict(once)
+    for looked in done:
+        mended = {name: _with(track, looked, name) for name, track in mended.items()}
+    return LookedAt(mended, tuple(done), (*found, *(one for looked in done for one in looked.findings)))
+
+
+def unlooked(tracks: Mapping[str, Track], of: Sequence[Part]) -> LookedAt:
+    """The recordings as they are."""
+    return LookedAt(tracks, tuple(_unchecked(tracks, part) for part in of), ())
+
+
+def _unchecked(tracks: Mapping[str, Track], part: Part) -> Looked:
+    series = tuple(_series(name, track, part) for name, track in tracks.items())
+    return Looked(part, series, level(series, part.expected), ())
+
+
+def _checked(tracks: Mapping[str, Track], part: Part) -> Looked:
+    raw = _unchecked(tracks, part)
+    straight = unwrapped(raw.series, raw.level)
+    known = level(straight.series, part.expected)
     if mixed := interleaved(straight.series, known):
-        return Signal(name, tracks, tuple(raw), known, (*mixed, *_turned(tracks)))
-    found = (*thawed.findings, *straight.findings, *jumping_clock(straight.series, known), *_turned(new))
-    return Signal(name, new, straight.series, known, found)
+        return replace(raw, findings=mixed)
+    found = (*frozen(straight.series, known), *straight.findings)
+    clock = () if part.turns else jumping_clock(straight.series, known)
+    return Looked(part, straight.series, known, (*found, *clock))
 
 
-def _turned(tracks: Mapping[str, Track]) -> tuple[Finding, ...]:
-    """What takes turns in the orientations, of poses."""
-    turns = [_orientation(recording, track) for recording, track in tracks.items() if track.quantity == "pose"]
-    return interleaved(turns, level(turns, EXPECTED_TURN)) if turns else ()
+def _series(recording: str, track: Track, part: Part) -> Series:
+    """A part of one recording, without the samples that lack it; of orientations with the signs of one motion."""
+    value = track.value[:, part.columns]
+    seen = ~np.isnan(value).any(axis=1)
+    value = value[seen]
+    kind = "orientation" if part.turns else part.limits.kind
+    if part.turns and len(value):  # q and -q are the same turn
+        flips = np.where(np.sum(value[1:] * value[:-1], axis=1) < 0, -1.0, 1.0)
+        value = value * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
+    return Series(recording, part.name, kind, track.stamp_ns[seen], value, part.limits.low, part.limits.high)
 
 
-def _series(recording: str, track: Track, kind: Kind, columns: slice) -> Series:
-    return Series(recording, track.object, kind, track.stamp_ns, track.value[:, columns])
-
-
-def _place(recording: str, track: Track, limits: Limits) -> Series:
-    """Position or angle, without the orientation of a pose."""
-    return replace(_series(recording, track, limits.kind, slice(0, 3)), low=limits.low, high=limits.high)
-
-
-def _orientation(recording: str, track: Track) -> Series:
-    """Quaternions with the signs of one motion: q and -q are the same turn."""
-    one = _series(recording, replace(track, object=f"orientation of {track.object}"), "orientation", slice(3, 7))
-    flips = np.where(np.sum(one.value[1:] * one.value[:-1], axis=1) < 0, -1.0, 1.0)
-    return replace(one, value=one.value * np.concatenate([[1.0], np.cumprod(flips)])[:, None])
-
-
-def _with(track: Track, one: Series) -> Track:
-    """The track with the samples that are left."""
-    if len(one.stamp_ns) == len(track.stamp_ns):
+def _with(track: Track, looked: Looked, recording: str) -> Track:
+    """The track with the numbers of a part as they were mended."""
+    one = next(one for one in looked.series if one.recording == recording)
+    at = np.searchsorted(track.stamp_ns, one.stamp_ns)
+    if looked.part.turns or np.array_equal(track.value[at, looked.part.columns], one.value):
         return track
-    keep = np.isin(track.stamp_ns, one.stamp_ns)
-    std = None if track.std is None else track.std[keep]
-    return replace(track, stamp_ns=track.stamp_ns[keep], value=track.value[keep], std=std)
-
-
-def _placed(track: Track, place: Floats) -> Track:
-    if np.array_equal(track.value[:, : place.shape[1]], place):
-        return track
-    return replace(track, value=np.concatenate([place, track.value[:, place.shape[1] :]], axis=1))
+    value = track.value.copy()
+    value[at, looked.part.columns] = one.value
+    return replace(track, value=value)
 
 
 def labels(episodes: Sequence[Episode]) -> list[str]:

@@ -21,10 +21,12 @@ import numpy as np
 from compass_ros.cells import Cell
 from compass_ros.cells.limits import Limits
 from compass_ros.checks.finding import Finding
+from compass_ros.checks.signals import Part
 from compass_ros.errors import DataError
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import recordings
-from compass_ros.types import QUANTITY_SIZE, Bools, Episode, Floats, Track
+from compass_ros.simulation.windows import windows
+from compass_ros.types import Bools, Episode, Floats, Track
 
 FACTORS: Mapping[str, tuple[str, float]] = {
     "angle": ("degrees, not radians", np.pi / 180),
@@ -43,29 +45,37 @@ SHARE = 0.3
 
 
 def units(
-    cell: Cell, episodes: Mapping[str, Episode], limits: Mapping[str, Limits], size: float
-) -> tuple[Finding, ...]:
-    """Objects whose numbers are in other units than the scene's. `size` [m]: the extent of the scene."""
+    cell: Cell, episodes: Mapping[str, Episode], parts: Mapping[str, Sequence[Part]], size: float
+) -> list[Finding]:
+    """Parts whose numbers are in other units than the scene's.
+
+    Args:
+        parts: By the name of their signal.
+        size: Extent of the scene [m].
+    """
     names = list(episodes)
     chosen = [episodes[names[i]] for i in np.unique(np.linspace(0, len(names) - 1, EPISODES).astype(int))]
-    found = []
+    found: list[Finding] = []
     for kind, (unit, factor) in FACTORS.items():
-        own = {o.name: limits[o.name] for o in cell.objects if limits[o.name].kind == kind}
-        doubts = {name: _doubt(chosen, name, one, size) for name, one in own.items()}
-        strange = [name for name, doubt in doubts.items() if doubt != "none"]
-        for group in dict.fromkeys((tuple(strange), *((name,) for name in strange))):
-            sure = all(doubts[name] == "sure" for name in group)
+        own = [(signal, p) for signal, of in parts.items() for p in of if p.limits.kind == kind and not p.turns]
+        doubts = {one: _doubt(chosen, *one, size) for one in own}
+        strange = [one for one, doubt in doubts.items() if doubt != "none"]
+        for group in dict.fromkeys((tuple(strange), *((one,) for one in strange))):
+            sure = all(doubts[one] == "sure" for one in group)
             if group and _in_other_units(Simulator(cell, threads=1), chosen, group, factor, sure):
                 looks = f"the numbers look like {unit}"
-                found += [Finding("units", "bad", name, dict.fromkeys(names, ()), looks) for name in group]
+                found += [Finding("units", "bad", part.name, dict.fromkeys(names, ()), looks) for _, part in group]
                 break
-    return tuple(found)
+    return found
 
 
-def _doubt(episodes: Sequence[Episode], name: str, limits: Limits, size: float) -> Literal["none", "some", "sure"]:
+def _doubt(episodes: Sequence[Episode], signal: str, part: Part, size: float) -> Literal["none", "some", "sure"]:
     """How sure the scene is that these units are wrong and the others are right."""
-    factor = FACTORS[limits.kind][1]
-    numbers = np.concatenate([e.track(name).value[:, :3] for e in episodes])
+    limits, factor = part.limits, FACTORS[part.limits.kind][1]
+    numbers = np.concatenate([e.track(signal).value[:, part.columns] for e in episodes])
+    numbers = numbers[~np.isnan(numbers).any(axis=1)]
+    if not len(numbers):
+        return "none"
     if np.isfinite(limits.high):
         return "sure" if _outside(numbers, limits, factor) else "none"
     if limits.kind == "angle":
@@ -85,24 +95,25 @@ def _outside(numbers: Floats, limits: Limits, factor: float) -> bool:
 
 
 def _in_other_units(
-    simulator: Simulator, episodes: Sequence[Episode], group: Sequence[str], factor: float, sure: bool
+    simulator: Simulator, episodes: Sequence[Episode], group: Sequence[tuple[str, Part]], factor: float, sure: bool
 ) -> bool:
     """Whether the simulator does better with these objects converted; where the scene is sure: not much worse."""
     as_it_is, converted = (_left(simulator, episodes, group, by) for by in (1.0, factor))
     return converted < (AGAINST if sure else 1 / TEN) * as_it_is
 
 
-def _left(simulator: Simulator, episodes: Sequence[Episode], group: Sequence[str], factor: float) -> float:
+def _left(simulator: Simulator, episodes: Sequence[Episode], group: Sequence[tuple[str, Part]], factor: float) -> float:
     """|S - D|^2 / |D|^2 over the first part of the episodes, these objects converted; inf where that is no motion."""
     cell = simulator.cell
     try:
-        data = recordings(cell, [_converted(e, group, factor) for e in episodes])
+        data = recordings(cell, windows(cell, [_converted(e, group, factor) for e in episodes])[:EPISODES])
     except DataError:
         return float("inf")
     until = data.time_s <= SHARE * cell.duration
-    columns = _columns(cell, group)
+    columns = [cell.signal(name).first + i for name, part in group for i in range(part.first, part.first + part.size)]
+    simulator = simulator.driven(data.drives)
     predicted = simulator.observe(
-        np.tile(simulator.defaults, (len(episodes), 1)), simulator.inputs(data.inputs), data.time_s
+        np.tile(simulator.defaults, (len(data.names), 1)), simulator.inputs(data.inputs), data.time_s
     )
     seen = until[:, :, None] & (data.time_s >= 0)[:, :, None] & ~np.isnan(data.measured)
     recorded, simulated = (
@@ -119,20 +130,12 @@ def _moved(values: Floats) -> Floats:
     return np.asarray(values - np.take_along_axis(values, first[:, None], axis=1))
 
 
-def _converted(episode: Episode, group: Sequence[str], factor: float) -> Episode:
+def _converted(episode: Episode, group: Sequence[tuple[str, Part]], factor: float) -> Episode:
     def of(track: Track) -> Track:
         value = track.value.copy()
-        value[:, :3] *= factor
-        return replace(track, value=value) if track.object in group else track
+        for name, part in group:
+            if name == track.object:
+                value[:, part.columns] *= factor
+        return replace(track, value=value)
 
     return replace(episode, tracks=tuple(map(of, episode.tracks)))
-
-
-def _columns(cell: Cell, group: Sequence[str]) -> list[int]:
-    """Of an observation: positions and angles of these objects."""
-    out, column = [], 0
-    for o in cell.objects:
-        size = QUANTITY_SIZE[o.quantity]
-        out += list(range(column, column + min(size, 3))) if o.name in group else []
-        column += size
-    return out

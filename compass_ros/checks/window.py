@@ -9,7 +9,7 @@ from compass_ros.cells import Cell
 from compass_ros.checks.finding import Finding
 from compass_ros.checks.onset import first_motion, leaving
 from compass_ros.checks.series import Level, Series
-from compass_ros.checks.signals import Signal
+from compass_ros.checks.signals import Looked
 from compass_ros.types import Episode
 
 _NS = 1e-9
@@ -24,17 +24,20 @@ class Windows:
     findings: tuple[Finding, ...]
 
 
-def windows(cell: Cell, episodes: Mapping[str, Episode], signals: Sequence[Signal], wrong: Collection[str]) -> Windows:
+def windows(cell: Cell, episodes: Mapping[str, Episode], looked: Sequence[Looked], wrong: Collection[str]) -> Windows:
     """Move the start of passive recordings that begin before the motion to where it begins.
 
     Where a command says when time 0 is, it stays, and so does a start whose state the recording states, and that of
-    recordings that are `wrong`.
+    recordings that are `wrong`. Recordings that are cut into windows are left to those who cut them.
     """
+    if cell.spec.windows is not None:
+        return Windows(episodes, (), ())
+    driven = bool(cell.action or cell.spec.inputs)
     late: dict[str, tuple[int, ...]] = {}
     out, still, longest = {}, [], 0.0
     for name, episode in episodes.items():
-        series = [(one, signal.level) for signal in signals for one in signal.series if one.recording == name]
-        stays = cell.action or episode.initial_state or name in wrong
+        series = [(one, part.level) for part in looked for one in part.series if one.recording == name]
+        stays = driven or episode.initial_state or name in wrong
         moved = episode if stays else _started(cell, episode, series)
         if moved.start_ns != episode.start_ns:
             late[name] = ()
@@ -45,7 +48,7 @@ def windows(cell: Cell, episodes: Mapping[str, Episode], signals: Sequence[Signa
     looks = f"the motion begins up to {longest:.2g} s after the recording: time 0 is moved there"
     found = [Finding("late", "repaired", "start", late, looks)] if late else []
     if still:
-        looks = f"nothing moves within {cell.duration:.3g} s of the {'command' if cell.action else 'start'}"
+        looks = f"nothing moves within {cell.duration:.3g} s of the {'command' if driven else 'start'}"
         everywhere = len(still) == len(episodes)
         found.append(Finding("still", "bad" if everywhere else "note", "start", dict.fromkeys(still, ()), looks))
     return Windows(out, tuple(still), tuple(found))

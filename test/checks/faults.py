@@ -127,7 +127,7 @@ def begins_late(episodes: Sequence[Episode], rng: np.random.Generator) -> list[E
             period = int(np.median(np.diff(track.stamp_ns)))
             stamps = np.arange(e.start_ns, e.start_ns + lead_ns, period)
             noise = np.std(np.diff(track.value, 3, axis=0), axis=0) / np.sqrt(20)
-            still = track.value[:3].mean(axis=0) + np.minimum(noise, 1e-3) * rng.normal(size=(len(stamps), len(noise)))
+            still = track.value[0] + np.minimum(noise, 1e-3) * rng.normal(size=(len(stamps), len(noise)))
             moved = np.concatenate([stamps, track.stamp_ns + (stamps[-1] + period - track.stamp_ns[0])])
             tracks.append(Track(track.object, track.quantity, moved, np.concatenate([still, track.value])))
         out.append(Episode(e.name, e.cell, e.cell_hash, e.action, e.start_ns, tuple(tracks)))
