@@ -68,7 +68,11 @@ def calibrate(
     used, steady = evenly(checked.episodes, config.episodes), Steady(report)
     first = CALIBRATION if config.discover else 1.0
     simulator = Simulator(cell, threads=config.threads)
-    told = []
+    told: list[str] = []
+
+    def noted(result: Result) -> Result:
+        return replace(result, warnings=(*told, *checked.said, *result.warnings), left_out=checked.left_out)
+
     for turn in range(2):
         fit, held_out = split(used, config, turn)
         most = config.windows if cell.spec.windows else config.episodes
@@ -90,7 +94,7 @@ def calibrate(
         if keep is not None:
             begun = not_evaluated("the search has not ended")
             known = assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, begun, yardsticks)
-            keep(known, begun)
+            keep(noted(known), begun)
         may_turn = turn == 0 and 0 < 2 * len(held_out) <= len(used)
         rest = steady.share(first, 1.0)
         found = searched(simulator, problem, estimate, refined, unseen, noise, config.seed, may_turn, rest)
@@ -106,7 +110,7 @@ def calibrate(
     if len(used) < len(checked.episodes):
         said = f"{len(used)} of {len(checked.episodes)} episodes were used, evenly over the order of recording"
         told.append(f"{said}; the option `episodes` takes more")
-    return replace(result, warnings=(*told, *checked.said, *result.warnings)), found
+    return noted(result), found
 
 
 def searched(

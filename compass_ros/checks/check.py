@@ -14,7 +14,7 @@ from compass_ros.checks.signals import LookedAt, Part, labels, look, parts, unlo
 from compass_ros.checks.units import units
 from compass_ros.checks.window import windows
 from compass_ros.errors import DataError
-from compass_ros.types import Episode, Track
+from compass_ros.types import Episode, LeftOut, Track
 
 LEAST = 3
 """Sound recordings from which the others are left out."""
@@ -26,8 +26,8 @@ class Checked:
 
     episodes: tuple[Episode, ...]
     """Those to use, mended where that is sure."""
-    left_out: tuple[str, ...]
-    """Names of the others."""
+    left_out: tuple[LeftOut, ...]
+    """The others, and why."""
     findings: tuple[Finding, ...]
     signals: Mapping[str, LookedAt]
     """By name, those that say where something is."""
@@ -42,8 +42,7 @@ class Checked:
     @property
     def said(self) -> tuple[str, ...]:
         """Everything, one sentence each."""
-        left = (f"{', '.join(self.left_out)}: left out",) if self.left_out else ()
-        return (*(one.sentence for one in self.findings), *left, *self.remarks)
+        return (*(one.sentence for one in self.findings), *self.remarks)
 
     @property
     def sentence(self) -> str:
@@ -68,9 +67,9 @@ def check(cell: Cell, episodes: Sequence[Episode]) -> Checked:
     findings += found.findings
     if len(found.still) == len(named) and not (cell.action or cell.spec.inputs):
         raise DataError(f"no recording holds a motion: {findings[-1].sentence}")
-    out = _left_out(tuple(named), findings, found.still)
+    out = _left_out(named, findings, found.still)
     used = tuple(episode for name, episode in found.episodes.items() if name not in out)
-    return Checked(used, out, tuple(findings), signals, doubts(cell, used))
+    return Checked(used, tuple(out.values()), tuple(findings), signals, doubts(cell, used))
 
 
 def _looked(
@@ -106,12 +105,15 @@ def _frames(cell: Cell, named: Mapping[str, Episode]) -> list[Finding]:
     return out
 
 
-def _left_out(names: tuple[str, ...], findings: Sequence[Finding], still: tuple[str, ...]) -> tuple[str, ...]:
+def _left_out(named: Mapping[str, Episode], findings: Sequence[Finding], still: Sequence[str]) -> dict[str, LeftOut]:
     """Recordings that nothing is computed from: the still ones, and the wrong ones where enough others are sound."""
     wrong = {name for one in findings for name in _wrong(one)} | set(still)
-    sound = len(names) - len(wrong)
+    sound = len(named) - len(wrong)
     chosen = wrong if sound >= max(LEAST, len(wrong)) else set(still)
-    return tuple(name for name in names if name in chosen and len(chosen) < len(names))
+    if len(chosen) == len(named):
+        return {}
+    why = {name: [f"{one.signal}: {one.looks}" for one in findings if name in one.samples] for name in chosen}
+    return {name: LeftOut(e.source or name, "; ".join(why[name])) for name, e in named.items() if name in chosen}
 
 
 def _wrong(finding: Finding) -> tuple[str, ...]:

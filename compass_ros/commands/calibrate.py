@@ -115,7 +115,7 @@ def run(
 
     def write(result: Result, found: Discovery) -> Result:
         budget = replace(result.budget, wall_seconds=time.monotonic() - started)
-        result = replace(result, budget=budget, left_out=reading.left_out)
+        result = replace(result, budget=budget, left_out=(*reading.left_out, *result.left_out))
         write_all(result, found, cell, out, repeat)
         return result
 
@@ -125,7 +125,7 @@ def run(
         steady.end("written")
     if style is ProgressStyle.bar:
         print_result(result)
-        for warning in (*reading.left_out, *result.warnings):
+        for warning in (*result.left_out, *result.warnings):
             typer.echo(f"note: {warning}", err=True)
         print(f"report: {os.path.relpath(out / 'report.html')}")
 
