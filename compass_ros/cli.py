@@ -16,6 +16,7 @@ from compass_ros.commands import (
     demo,
     diagnose,
     evaluate,
+    init,
     plan,
     policy,
     prove,
@@ -34,7 +35,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for module in (demo, plan, track, record, calibrate, evaluate, diagnose, report, policy):
+for module in (demo, init, plan, track, record, calibrate, evaluate, diagnose, report, policy):
     module.add_to(app)
 for module in (conceal, unseal, prove, rivals, bench, real, tables):
     module.add_to(app)

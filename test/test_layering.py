@@ -19,6 +19,7 @@ JOINS = {
     "pipeline": 3,
     "results": 3,
     "evaluation": 4,
+    "starter": 4,
     "operation": 3,
     "concealed": 3,
     "bench": 4,

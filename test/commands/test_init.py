@@ -1,0 +1,59 @@
+"""`compass init`, then `compass calibrate`: from a URDF without drives and bags to a report, and nothing edited."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from test.starter.recorded import URDF, moved, record, stamps, state
+
+
+def compass(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    # By the module, so that the sources of this checkout run.
+    command = [sys.executable, "-m", "compass_ros.cli", *words]
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=300
+    )
+
+
+def test_a_newcomer_edits_nothing(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(URDF.format("panda_joint1", "panda_joint2"))
+    for seed in range(3):
+        time, target, got = moved(seed, 5.0, 0.02)
+        stamp, names = stamps(time, seed), ["joint_1", "joint_2"]
+        shown = state("a", "/joint_states", names[::-1], stamp, got[:, ::-1])
+        record(tmp_path / "bags", seed, [shown, state("b", "/joint_commands", names, stamp, target)])
+    begun = compass(tmp_path, "init", "arm.urdf", "bags", "--out", "cell.yaml")
+    assert begun.returncode == 0, begun.stderr
+    assert "1 inputs, 1 signals, 11 parameters" in begun.stdout
+    assert "2 mesh files are not there" in begun.stderr
+    done = compass(tmp_path, "calibrate", "--cell", "cell.yaml", "--no-discover", "--out", "out", "bags")
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    found = {row["name"]: row for row in result["parameters"]}
+    for name, true in (
+        ("panda_joint1@actuation@gain", 60.0),
+        ("panda_joint2@actuation@gain", 30.0),
+        ("panda_joint1@dyna@damping", 4.5),
+        ("target@actuation@delay", 0.02),
+    ):
+        assert found[name]["value"] == pytest.approx(true, rel=0.05), name
+    gap = result["gap"]["calibrated"]["held_out"]["signals"]["joints"]
+    assert gap["rms"] < 1.2 * max(gap["floor"], 0.0005)
+    assert math.isfinite(gap["rms"])
+
+
+def test_what_is_wrong_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text("<robot")
+    for words in (("init", "gone.xml", "bags"), ("init", "arm.urdf", "bags")):
+        done = compass(tmp_path, *words)
+        assert done.returncode == 1
+        assert len(done.stderr.strip().splitlines()) == 1
+        assert words[1] in done.stderr
