@@ -32,9 +32,12 @@ _ALIKE = 0.98
 """Cosine between relative changes along an open direction and equal ones, from which it is a common factor."""
 
 
-def alone(covariance: Floats) -> Floats:
-    """(p,) standard deviation of each parameter with the prior of all others WIDER, from a (p, p) covariance."""
-    own = np.diag(_widened(covariance))
+def alone(covariance: Floats, coupled: Floats | float = 1.0) -> Floats:
+    """(p,) standard deviation of each parameter with the prior of all others WIDER, from a (p, p) covariance.
+
+    `coupled`: (p,) factors by which parameters that are not among these make them less certain (`screen.coupling`).
+    """
+    own = np.diag(_widened(covariance)) * coupled**2
     return np.asarray(np.sqrt(own / (1 + (1 - WIDER**-2) * own)))  # its own prior back (Sherman and Morrison 1950)
 
 

@@ -173,13 +173,13 @@ def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True)
 def concluded(rough: Likelihood, fit: Fit, influence: Influence) -> Refined:
     """A fit with its errors; `rough`: the likelihood whose sigma holds the simulator's roughness."""
     spread, felt = covariance(rough, fit), fit.free
-    own = alone(spread[: len(felt), : len(felt)])
+    among, coupled = spread[: len(felt), : len(felt)], np.ones(len(felt))
     if many(rough):
         share, factor = information_share(rough, fit), np.ones(len(spread))
         factor[: len(felt)] = coupling(influence.gram, felt, share)
         spread = spread * np.outer(factor, factor)
-        own = own * coupling(influence.gram, felt, WIDER**2 * share)
-    return Refined(fit, rough, spread, own, chi_square(rough, fit), influence)
+        coupled = coupling(influence.gram, felt, WIDER**2 * share)
+    return Refined(fit, rough, spread, alone(among, coupled), chi_square(rough, fit), influence)
 
 
 def freed(

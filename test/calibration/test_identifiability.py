@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compass_ros.calibration.identifiability import IDENTIFIED, alone, together
+from compass_ros.calibration.identifiability import IDENTIFIED, WIDER, alone, together
 from compass_ros.calibration.refine import Refined, refine, standard_errors
 from compass_ros.types import Floats, Together
 from test.calibration.toys import likelihood
@@ -150,6 +150,24 @@ def test_wider_priors_of_the_others_are_what_is_asked() -> None:
         prior[i] = 1.0
         assert asked[i] == pytest.approx(np.sqrt(np.linalg.inv(information + np.diag(prior))[i, i]))
     assert alone(np.zeros((0, 0))).shape == (0,)
+
+
+@pytest.mark.parametrize(("width", "identified"), [(1.0, False), (0.3, False), (0.1, False), (0.01, True)])
+def test_what_was_screened_out_counts_too(width: float, identified: bool) -> None:
+    """Of two numbers that add up, among hundreds, one is freed; the other's prior says how well it is known."""
+    scale = np.ones(130)
+    scale[1] = width
+    given = likelihood(
+        lambda v, i, t: (i * (v[:, :1] + v[:, 1:2]) * t)[..., None],
+        (0.4,) + (0.0,) * 129,
+        SHOTS,
+        sigma=0.005,
+        noise=0.005,
+    )
+    found = refine(replace(given, prior_std=scale), given.prior_mean)
+    assert found.fit.free.tolist() == [0]
+    assert (found.alone < IDENTIFIED).tolist() == [identified]
+    assert found.alone[0] == pytest.approx(min(WIDER * width / np.sqrt(1 + (WIDER * width) ** 2), 1.0), abs=0.02)
 
 
 def test_a_group_says_itself_in_a_sentence() -> None:
