@@ -218,9 +218,11 @@ def _written(folder: Path, content: dict[str, object]) -> Cell:
 
 
 def recorded(cell: Cell, seed: int, folder: Path, size: Size = FULL) -> list[Path]:
-    """Bags of the cell: three episodes or more of other parameters than it states, with noise and lost frames."""
+    """Bags of the cell: mostly as many episodes as a search for missing physics needs, with noise and lost frames."""
     rng = np.random.default_rng([seed, 1])
-    episodes, rate = int(rng.integers(3, size.episodes + 1)), min(int(rng.choice([30, 60, 100])), size.rate_hz)
+    few = rng.random() < 0.1
+    episodes = int(rng.integers(1, 4) if few else rng.integers(4, size.episodes + 1))
+    rate = min(int(rng.choice([30, 60, 100])), size.rate_hz)
     low, high, width = (np.array([getattr(p, what) for p in cell.parameters]) for what in ("low", "high", "half_width"))
     truth = np.clip(cell.defaults + width * rng.normal(size=len(width)), low, high)
     inputs = np.stack([_inputs(cell, rng) for _ in range(episodes)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -44,6 +45,15 @@ def test_apply_and_revert_go_through_the_versions_and_keep_them(cell: Cell, vers
     assert three.number == 3, "a number is never given twice"
     assert Versions(tmp_path / "versions", "air_hockey").applied() == three, "a process that starts later knows"
     assert sorted(path.name for path in versions.folder.iterdir()) == ["0001", "0002", "0003", "state.yaml"]
+
+
+def test_what_the_scene_is_made_of_goes_with_it(cell: Cell, versions: Versions, tmp_path: Path) -> None:
+    folder = write_calibration(tmp_path / "one", cell, {FRICTION: 0.03})
+    (folder / "assets").mkdir()
+    (folder / "assets" / "rod.obj").write_text("v 0 0 0")
+    one = versions.apply(folder, {})
+    shutil.rmtree(folder)
+    assert (one.folder / "assets" / "rod.obj").read_text() == "v 0 0 0"
 
 
 def test_a_value_at_its_bound_may_be_beyond_it_by_a_digit(cell: Cell, tmp_path: Path) -> None:
