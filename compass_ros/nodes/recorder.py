@@ -17,12 +17,12 @@ from std_srvs.srv import Trigger
 
 from compass_ros.episodes.recording import Recorder
 from compass_ros.episodes.writer import sync_bag
-from compass_ros.errors import BagError
+from compass_ros.errors import BagError, shown
 from compass_ros.nodes.managed import ManagedNode
 from compass_ros.nodes.qos import LATCHED
 from compass_ros.nodes.recorder_messages import episode_message, health_message
 from compass_ros.nodes.requests import checked_action, checked_text, one_line, wrong_text
-from compass_ros.nodes.run import run
+from compass_ros.nodes.run import ROS_ERRORS, run
 from compass_ros.nodes.topic_watch import TopicWatch
 
 DISCOVERY_PERIOD_S = 0.2
@@ -137,8 +137,8 @@ class RecorderNode(ManagedNode):
         for topic in topics:
             try:
                 validate_full_topic_name(self.resolve_topic_name(topic))
-            except NameValidationException as error:
-                return one_line(str(error))
+            except (NameValidationException, *ROS_ERRORS) as error:
+                return f"{shown(topic)} is no name of a topic: {one_line(str(error).split(', at ')[0])}"
         return ""
 
     def _on_discovery(self) -> None:
