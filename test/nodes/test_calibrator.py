@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -60,10 +61,18 @@ def test_a_start_with_bags_publishes_what_result_json_says(
     bags: Path, tmp_path: Path, start_node: StartNode, probe: Probe
 ) -> None:
     output = tmp_path / "out" / "result"
-    start_node("calibrator", bags=str(bags), output=str(output), rollouts=600, seed=1)
+    empty = shutil.copytree(min(bags.iterdir()), tmp_path / "empty")
+    next(empty.glob("*.mcap")).write_bytes(b"")
+    start_node("calibrator", bags=[str(bags), str(empty)], output=str(output), rollouts=600, seed=1)
     diagnostics = probe.listen(DiagnosticArray, "/diagnostics")
-    status = probe.wait_for(probe.listen(CalibrationStatus, STATUS, LATCHED), ended)
+    heard = probe.listen(CalibrationStatus, STATUS, RELIABLE)
+    status = probe.wait_for(heard, ended)
     assert (status.state, status.message) == (CalibrationStatus.SUCCEEDED, f"result in {output}")
+    shares = [one.share_done for one in heard]
+    assert shares == sorted(shares), "progress never runs backwards"
+    assert shares[-1] == 1.0
+    (left_out,) = status.left_out
+    assert left_out.startswith(f"{empty} was left out: ")
 
     # All three arrive although this client subscribes after they were published.
     parameters = probe.wait_for(probe.listen(SimParameters, "/calibrator/sim_parameters", LATCHED))
@@ -82,13 +91,15 @@ def test_a_start_with_bags_publishes_what_result_json_says(
     assert dict(zip(nominal.factors, nominal.d, strict=True)) == result["gap"]["nominal"]["fit"]["d"]
     assert names(tmp_path / "out") == ["result"]
     typed = f"compass calibrate --cell air_hockey --method default --seed 1 --rollouts 600 --out {output} -- {bags}"
-    assert read_all(output)[1].command == typed
+    assert read_all(output)[1].command == f"{typed} {empty}"
+    assert [one["bag"] for one in result["episodes"]["left_out"]] == [str(empty)]
 
     said = probe.wait_for(
         diagnostics,
         lambda message: "calibration" in message.status[0].name and "succeeded" in message.status[0].message,
     )
-    assert said.status[0].level == DiagnosticStatus.OK
+    assert said.status[0].level == DiagnosticStatus.WARN
+    assert left_out in said.status[0].message
 
 
 def test_feedback_a_second_one_refused_and_cancel_within_a_second(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shlex
 import signal
@@ -19,6 +20,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from lifecycle_msgs.srv import GetState
 from rosgraph_msgs.msg import Clock
 
+from compass_ros.episodes import list_topics
 from test.nodes.harness import PATIENCE_S, RELIABLE, SENSOR, Probe, held_locks, until
 from test.test_launch import Noted, description
 
@@ -103,8 +105,14 @@ def test_the_virtual_cell_in_a_namespace(probe: Probe, monkeypatch: pytest.Monke
         heard = probe.listen(PoseWithCovarianceStamped, "/cell1/puck_tracker/puck1/pose", SENSOR)
         probe.wait_for(heard)
         assert all(active(probe, f"/cell1/{name}") for name in lines if name != "virtual_cell")
-        assert (tmp_path / "ros" / "compass_ros" / "episodes").is_dir(), "and not in the working directory"
-        assert {path.suffix for path in tmp_path.iterdir()} == {"", ".log"}
+        (tmp_path / "shots.yaml").write_text("shots: [{x: -0.22, y: 0.07, angle: 0.05, velocity: 0.45}]")
+        words = [sys.executable, "-m", "compass_ros.nodes.shooter", "--ros-args", "-r", "__ns:=/cell1"]
+        words += ["-p", f"shots_file:={tmp_path / 'shots.yaml'}", "-p", "timeout_s:=100.0"]
+        told = subprocess.run(words, cwd=tmp_path, check=True, capture_output=True, text=True, timeout=PATIENCE_S)
+        bag = Path(json.loads(told.stdout)["bag"])
+        assert bag == tmp_path / "ros" / "compass_ros" / "episodes" / "episode_0001", "not in the working directory"
+        assert {topic.name: topic.messages > 100 for topic in list_topics(bag)}["/puck_tracker/puck1/pose"]
+        assert {path.suffix for path in tmp_path.iterdir()} == {"", ".log", ".yaml"}
 
 
 def test_the_real_cell_hears_the_camera_and_follows_the_simulated_clock(

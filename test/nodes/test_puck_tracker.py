@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
+from itertools import count
 
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from numpy.typing import NDArray
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, SetParameters
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, Image
 from std_srvs.srv import Trigger
+from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from compass_ros.nodes.images import (
@@ -22,12 +25,16 @@ from compass_ros.nodes.images import (
     header,
     image_from_message,
     image_message,
+    place_of,
+    stamp_message,
     stamp_ns,
+    transform_message,
 )
+from compass_ros.tracking.frames import Place
 from compass_ros.tracking.scene_config import SceneConfig
 from compass_ros.tracking.virtual_camera import VirtualCamera, make_camera, render
 from test.nodes.conftest import StartNode
-from test.nodes.harness import PATIENCE_S, NodeProcess, Probe, until
+from test.nodes.harness import LATCHED, PATIENCE_S, RELIABLE, NodeProcess, Probe, until
 
 pytestmark = pytest.mark.ros
 SENSOR = QoSProfile(depth=30, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -90,6 +97,39 @@ def test_poses_have_the_stamp_of_their_image_and_say_when_they_are_predicted(pro
     assert {m.ns for m in probe.wait_for(markers).markers} == set(PLACES)
     until(lambda: bool(send()) and bool(debug), "an annotated image")
     assert debug[0].width == 640
+
+
+def test_the_camera_hangs_below_the_tables_frame_and_all_hear_it(
+    start_node: StartNode, probe: Probe, camera: VirtualCamera
+) -> None:
+    """Where the driver has a tree of frames its root is hung; poses and images are offered as reliable."""
+    start_node("puck_tracker", frame="bench")
+    tree = probe.node.create_publisher(TFMessage, "/tf_static", LATCHED)
+    known = transform_message(Place(np.eye(3), np.array([0.0, 0.015, 0.0])), "link", "optical", stamp_message(0))
+    tree.publish(TFMessage(transforms=[known]))
+    said = probe.listen(TFMessage, "/tf_static", QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+    poses = probe.listen(PoseWithCovarianceStamped, "/puck_tracker/puck1/pose", RELIABLE)
+    debug = probe.listen(Image, "/puck_tracker/debug_image", RELIABLE)
+    markers = probe.listen(MarkerArray, "/puck_tracker/markers", RELIABLE)
+    info, image = probe.publisher(CameraInfo, "/camera_info", SENSOR), probe.publisher(Image, "/image", SENSOR)
+    picture = render(camera, {name: np.tile([*xy, 0.0], (5, 1)) for name, xy in PLACES.items()}, 1)
+
+    numbers = count()
+
+    def found() -> list[TransformStamped]:
+        head = header(T0 + 16_666_667 * next(numbers), "optical")
+        info(camera_info_message(camera.scene.view.camera, head))
+        image(image_message(picture, head))
+        time.sleep(0.01)
+        return [t for message in said for t in message.transforms if t.header.frame_id == "bench"]
+
+    until(lambda: bool(found()) and bool(poses) and bool(debug) and bool(markers), "the camera's place, and the rest")
+    (hung, *_) = found()
+    assert hung.child_frame_id == "link"
+    seen = place_of(hung.transform) @ place_of(known.transform)
+    view = camera.scene.view
+    assert seen.near(Place(view.rotation.T, view.position), 0.003, 0.003)
+    assert poses[0].header.frame_id == markers[0].markers[0].header.frame_id == "bench"
 
 
 def test_parameters_are_described_and_take_effect_while_it_runs(probe: Probe, send: Send) -> None:

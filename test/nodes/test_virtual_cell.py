@@ -11,7 +11,7 @@ import yaml
 from compass_ros_interfaces.msg import ShotCommand
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import CameraInfo, JointState
 from std_srvs.srv import Trigger
 
@@ -25,7 +25,8 @@ from test.nodes.conftest import StartNode
 from test.nodes.harness import PATIENCE_S, Probe, until
 
 pytestmark = pytest.mark.ros
-IMAGES = QoSProfile(depth=60, reliability=ReliabilityPolicy.BEST_EFFORT)
+IMAGES = QoSProfile(depth=60)
+"""Reliable, as the displays of RViz and Foxglove ask."""
 SHOT = {"x": -0.22, "y": 0.07, "angle": 0.05, "velocity": 0.45}
 TRUTH = {"env@camera@bias_x": 0.03, "env@camera@bias_y": -0.02, "puck2@dyna@friction_sliding": 0.03}
 

@@ -11,7 +11,7 @@ import numpy as np
 from compass_ros.cells import Cell
 from compass_ros.reporting.result_json import write_result
 from compass_ros.simulation.export import write_effects_of, write_scene
-from compass_ros.types import Budget, Gap, Graph, Mismatch, ParameterRow, Result, Verdict
+from compass_ros.types import Budget, Gap, Graph, Mismatch, ParameterRow, Result, Unit, Verdict
 
 
 def write_calibration(
@@ -21,6 +21,7 @@ def write_calibration(
     verdict: Verdict = "none",
     held_out: Sequence[str] = (),
     cancelled: bool = False,
+    unit: Unit = "m",
 ) -> Path:
     """A calibration that found the defaults, except for the given parameters."""
     values = cell.values(given)
@@ -48,6 +49,7 @@ def write_calibration(
         trace=(),
         replays=(),
         cancelled=cancelled,
+        unit=unit,
     )
     folder.mkdir(parents=True)
     write_scene(cell, values, folder / "scene.xml")
