@@ -12,7 +12,7 @@ from decimal import Decimal
 import numpy as np
 
 from compass_ros.errors import DataError, nearest, shown
-from compass_ros.types import Floats
+from compass_ros.types import Floats, Ints
 
 MISSING = frozenset(
     {"", "#n/a", "#n/a n/a", "#na", "-1.#ind", "-1.#qnan", "-nan", "1.#ind", "1.#qnan"}
@@ -46,7 +46,7 @@ class Table:
     names: Sequence[tuple[str, ...]]
     """Of each column from the top: the header lines above it and its own, as ("Cube", "Position", "X"); columns of
     arrays are numbered `0`, `1`, ..., after the array's name where there are several."""
-    cells: Callable[[int], Sequence[object] | Floats]
+    cells: Callable[[int], Sequence[object] | Floats | Ints]
     """Content of a column by its place."""
     rows: int
     """Of the longest column."""
@@ -87,6 +87,13 @@ class Table:
         if len({isinstance(at, datetime) for at in known}) > 1:
             raise DataError(f"{asked}: column '{name}' holds dates and numbers")
         return np.array([np.nan if at is None else _since(known[0], at, unit_s) for at in times])
+
+    def parts(self, name: str) -> Sequence[str]:
+        """The columns of an array, by its name; of anything else the name itself."""
+        whole = {"/".join(parts) for parts in self.names}
+        if name in whole or f"{name}.0" not in whole:
+            return (name,)
+        return [f"{name}.{i}" for i in range(len(whole)) if f"{name}.{i}" in whole]
 
     def index(self, name: str | int, asked: str) -> int:
         """Place of a column. Raises DataError with the columns that there are."""

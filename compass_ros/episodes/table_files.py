@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import struct
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -19,8 +20,11 @@ from compass_ros.episodes.delimited import read_rows
 from compass_ros.episodes.raw import one_line
 from compass_ros.episodes.table import Table
 from compass_ros.episodes.table_rows import Row, tables_of
-from compass_ros.errors import DataError
-from compass_ros.types import Floats
+from compass_ros.errors import DataError, nearest
+from compass_ros.types import Floats, Ints
+
+Samples = Floats | Ints
+"""Numbers of an array: whole ones stay whole."""
 
 _DAMAGED = (
     *(OSError, EOFError, ValueError, TypeError, LookupError, OverflowError, MemoryError, RuntimeError),
@@ -66,12 +70,12 @@ def npz_tables(path: Path, selection: Selection) -> Iterator[Table]:
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             if "=" in selection.pattern:
-                yield from _side_by_side(path, arrays, _wanted(selection.pattern, arrays))
+                yield from _side_by_side(path, arrays, selection.pattern)
                 return
             named = {key: arrays[key] for key in arrays.files if fnmatchcase(key, selection.pattern)}
             numbers = {key: array for key, array in named.items() if array.ndim and array.dtype.kind in "biuf"}
             for index, (key, array) in enumerate(numbers.items(), 1):
-                columns = {str(i): c for i, c in enumerate(np.reshape(array, (len(array), -1)).astype(float).T)}
+                columns = {str(i): c for i, c in enumerate(np.reshape(_numbers(array), (len(array), -1)).T)}
                 yield _of_arrays(path, index, key, columns)
     except _DAMAGED as error:
         raise DataError(f"cannot be read as NPZ with arrays of numbers: {one_line(error)}") from error
@@ -86,7 +90,7 @@ def mat_tables(path: Path, selection: Selection) -> Iterator[Table]:
     """
     try:
         content = {name: value for name, value in scipy.io.loadmat(str(path)).items() if not name.startswith("__")}
-        yield from _side_by_side(path, content, _wanted(selection.pattern, content))
+        yield from _side_by_side(path, content, selection.pattern)
     except NotImplementedError as error:
         hint = "save it again in MATLAB with the option '-v7': save('FILE.mat', 'VARIABLE', '-v7')"
         raise DataError(f"MAT files of version 7.3 (HDF5) are not read; {hint}") from error
@@ -103,39 +107,78 @@ FORMATS: Mapping[str, Callable[[Path, Selection], Iterator[Table]]] = {
 """Each raises DataError without the file's name."""
 
 
-def _wanted(pattern: str, content: Mapping[str, object]) -> dict[str, str]:
-    """Variables by what they are called in the YAML: pairs NAME=VARIABLE, or patterns of the variables' own names."""
+def _groups(pattern: str, content: Mapping[str, object]) -> tuple[dict[str, dict[str, str]], list[str]]:
+    """Variables by what they are called in the YAML, for each recording by its name; and what there is to say.
+
+    Pairs NAME=VARIABLE, or patterns of the variables' own names: one recording without a name (""). With a star in a
+    pair's variable, a recording for all that the stars together can stand for.
+    """
     words = pattern.split()
-    named = dict(word.split("=", 1) for word in words if "=" in word)
+    pairs = [tuple(word.split("=", 1)) for word in words if "=" in word]
+    starred = {name: _standing(variable, content) for name, variable in pairs if "*" in variable}
+    plain = {name: variable for name, variable in pairs if name not in starred}
     own = [name for name in content if any(fnmatchcase(name, word) for word in words if "=" not in word)]
-    return named | {name: name for name in own if np.asarray(content[name]).dtype.kind in "biuf"}
+    plain |= {name: name for name in own if np.asarray(content[name]).dtype.kind in "biuf"}
+    if not starred:
+        return ({"": plain} if plain else {}), []
+    every = list(dict.fromkeys(key for found in starred.values() for key in found))
+    whole = [key for key in every if all(key in found for found in starred.values())]
+    said = [
+        f"{key} is left out: no array for {', '.join(name for name, found in starred.items() if key not in found)}"
+        for key in every
+        if key not in whole
+    ]
+    return {key: plain | {name: found[key] for name, found in starred.items()} for key in whole}, said
 
 
-def _side_by_side(path: Path, content: Mapping[str, object], wanted: Mapping[str, str]) -> Iterator[Table]:
+def _standing(variable: str, content: Mapping[str, object]) -> dict[str, str]:
+    """What the star in a variable's name can stand for, with the variable that it is then."""
+    begin, _, end = variable.partition("*")
+    matches = re.compile(f"{re.escape(begin)}(.+){re.escape(end)}")
+    return {found[1]: name for name in content if (found := matches.fullmatch(name))}
+
+
+def _side_by_side(path: Path, content: Mapping[str, object], pattern: str) -> Iterator[Table]:
     """One table for each recording that the variables hold."""
-    if not wanted:
-        raise DataError(f"no variables of numbers are asked for; it has {', '.join(content)}")
-    recordings = {name: _recordings(content, variable) for name, variable in wanted.items()}
-    counts = {name: len(found) for name, found in recordings.items()}
-    if len(set(counts.values())) > 1:
-        raise DataError(f"the variables hold different numbers of recordings: {counts}")
-    for index, arrays in enumerate(zip(*recordings.values(), strict=True), 1):
-        length = next((array.size for array in arrays if 1 in array.shape and array.size > 1), 0)
-        columns: dict[str, Floats] = {}
-        for name, array in zip(recordings, arrays, strict=True):
-            samples = _samples(array, length)
-            columns |= {f"{name}.{i}": column for i, column in enumerate(samples.T)}
-            if samples.shape[1] == 1:
-                columns[name] = samples[:, 0]
-        key = str(index) if max(counts.values()) > 1 else path.stem
-        yield _of_arrays(path, index, key, columns)
+    groups, said = _groups(pattern, content)
+    if not groups:
+        raise DataError(f"no variables of numbers are asked for; it has {_few(content)}")
+    index = 0
+    for key, wanted in groups.items():
+        recordings = {name: _recordings(content, variable) for name, variable in wanted.items()}
+        counts = {name: len(found) for name, found in recordings.items()}
+        if len(set(counts.values())) > 1:
+            raise DataError(f"the variables hold different numbers of recordings: {counts}")
+        for number, arrays in enumerate(zip(*recordings.values(), strict=True), 1):
+            index += 1
+            several = max(counts.values()) > 1
+            label = " ".join(filter(None, (key, str(number) if several else ""))) or path.stem
+            yield replace(_of_arrays(path, index, label, _columns(recordings, arrays)), remarks=tuple(said))
+            said = []
 
 
-def _recordings(content: Mapping[str, object], variable: str) -> list[Floats]:
+def _columns(names: Iterable[str], arrays: Sequence[Samples]) -> dict[str, Samples]:
+    """The columns of matrices beside each other, each by its own number, and of a single one by its name."""
+    length = next((array.size for array in arrays if 1 in array.shape and array.size > 1), 0)
+    columns: dict[str, Samples] = {}
+    for name, array in zip(names, arrays, strict=True):
+        samples = _samples(array, length)
+        columns |= {f"{name}.{i}": column for i, column in enumerate(samples.T)}
+        if samples.shape[1] == 1:
+            columns[name] = samples[:, 0]
+    return columns
+
+
+def _few(names: Iterable[str]) -> str:
+    every = [*names]
+    return f"{', '.join(every[:20])}{', ...' * (len(every) > 20)}"
+
+
+def _recordings(content: Mapping[str, object], variable: str) -> list[Samples]:
     """The matrices in a variable: itself, or its cells."""
-    first, *fields = variable.split(".")
+    first, *fields = [variable] if variable in content else variable.split(".")  # arrays of NPZ may have any name
     if first not in content:
-        raise DataError(f"no variable '{variable}'; it has {', '.join(content)}")
+        raise DataError(f"no variable '{variable}'; it has {_few(content)}{nearest(first, content)}")
     value = np.asarray(content[first])
     for field in fields:
         if value.dtype.names is None or field not in value.dtype.names:
@@ -145,22 +188,28 @@ def _recordings(content: Mapping[str, object], variable: str) -> list[Floats]:
     return [_matrix(cell, variable) for cell in (np.ravel(value) if value.dtype == object else [value])]
 
 
-def _matrix(cell: object, variable: str) -> Floats:
-    array = np.asarray(cell, float)
+def _numbers(cell: object) -> Samples:
+    """Whole numbers stay whole: a time in nanoseconds since 1970 has more digits than a float."""
+    array = np.asarray(cell)
+    return np.asarray(array, np.int64) if array.dtype.kind in "iu" else np.asarray(array, float)
+
+
+def _matrix(cell: object, variable: str) -> Samples:
+    array = _numbers(cell)
     if array.ndim > 2:
         raise DataError(f"'{variable}' has {array.ndim} dimensions; expected vectors and matrices")
     return array.reshape(-1, 1) if array.ndim < 2 else array
 
 
-def _samples(array: Floats, length: int) -> Floats:
+def _samples(array: Samples, length: int) -> Samples:
     """The matrix with its samples as rows."""
     if length in array.shape:
         return array if array.shape[0] == length else array.T
     return array if array.shape[0] >= array.shape[1] else array.T
 
 
-def _of_arrays(path: Path, index: int, key: str, columns: Mapping[str, Floats]) -> Table:
+def _of_arrays(path: Path, index: int, key: str, columns: Mapping[str, Samples]) -> Table:
     labels = {"file": path.stem, "index": str(index), "key": key}
-    every: Sequence[Floats] = list(columns.values())
+    every: Sequence[Samples] = list(columns.values())
     rows = max((len(column) for column in every), default=0)
     return Table(labels, [(name,) for name in columns], every.__getitem__, rows, lambda row: f"row {row + 1}")

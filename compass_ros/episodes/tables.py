@@ -5,96 +5,25 @@ from __future__ import annotations
 import os
 import unicodedata
 from collections.abc import Iterator, Sequence
-from dataclasses import field
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 from string import Formatter
-from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
-from pydantic.dataclasses import dataclass
 
-from compass_ros.config import read_yaml
 from compass_ros.episodes.episode_writer import write_episode
-from compass_ros.episodes.measured import left_out, measured
+from compass_ros.episodes.import_config import ImportConfig, Recordings, read_config
 from compass_ros.episodes.names import safe_name
+from compass_ros.episodes.sources import Source, default_topic
 from compass_ros.episodes.table import Table
 from compass_ros.episodes.table_files import FORMATS, Selection
-from compass_ros.errors import ConfigError, DataError, nearest, shown
-from compass_ros.types import QUANTITY_SIZE, Episode, Floats, Quantity, Track
+from compass_ros.episodes.table_tracks import FIRST_STAMP_NS, constant_of, first_of, time_of, track_of
+from compass_ros.errors import ConfigError, DataError
+from compass_ros.types import Episode
 
 DATA_VARIABLE = "COMPASS_REAL_DATA"
 _PROJECT = Path(__file__).parents[2]
-_FIRST_STAMP_NS = 10**9
-"""Stamp of time 0 of a table: one second, because a stamp of 0 means `not set` in ROS."""
-
-_strict = ConfigDict(extra="forbid")
-
-
-@dataclass(frozen=True, config=_strict)
-class TimeColumn:
-    """Where the time of a row comes from: a column, or a rate."""
-
-    column: str | int = ""
-    """Numbers, or dates with the time of day (ISO 8601; then `unit_s` is not looked at)."""
-    unit_s: Annotated[float, Field(gt=0)] = 1.0
-    """Seconds in one unit of the column."""
-    nanosec: str | int = ""
-    """A column of nanoseconds to add, as in a stamp of ROS."""
-    rate_hz: Annotated[float, Field(ge=0)] = 0.0
-    """Rows a second, where there is no column."""
-
-
-@dataclass(frozen=True, config=_strict)
-class Numbers:
-    """Columns of a table as SI numbers: (column - minus) * scale + offset."""
-
-    columns: tuple[str | int | None, ...]
-    """null: zero in every row."""
-    minus: tuple[str | int | None, ...] = ()
-    """Columns to subtract, e.g. for the angle of one link relative to another."""
-    scale: tuple[float, ...] = ()
-    """SI units in one unit of the column; empty: 1."""
-    offset: tuple[float, ...] = ()
-
-
-@dataclass(frozen=True, config=_strict)
-class TrackColumns(Numbers):
-    quantity: Quantity = "xyz"
-    std: Annotated[float, Field(ge=0)] = 0.0
-    """Standard deviation of one measurement [m or rad]; 0: not stated."""
-
-
-@dataclass(frozen=True, config=_strict)
-class Recordings:
-    """Some tables of one file, or of several alike; each becomes a bag."""
-
-    file: Annotated[str, Field(max_length=200)]
-    """In the data folder; a pattern, as `throw_*.csv`, stands for all files that match."""
-    format: Literal["csv", "xlsx", "npz", "mat"]
-    name: str
-    """Name of the episode, with {key}, {group}, {index}; `names.safe_name` makes it a folder's."""
-    tables: str = "*"
-    """npz: pattern of the arrays' names; xlsx: of the sheets' names; mat: variables side by side, `time=T state=Y`."""
-    group_by: str = ""
-    """csv, xlsx: a column whose values part the rows into recordings."""
-    header: Annotated[int, Field(ge=0)] | None = None
-    """csv, xlsx: line of the columns' names, 0 where there is none; left out: it is looked for."""
-
-
-@dataclass(frozen=True, config=_strict)
-class ImportConfig:
-    """The YAML of an import."""
-
-    cell: str
-    recordings: tuple[Recordings, ...]
-    time: TimeColumn
-    tracks: dict[str, TrackColumns]
-    initial_state: dict[str, Numbers] = field(default_factory=dict)
-    """By object: from the first row that has them all."""
-    action: dict[str, Numbers] = field(default_factory=dict)
-    """By name of the action's field: one column, the same number in all rows that have one."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +47,7 @@ def import_tables(yaml_path: str | Path, out: str | Path, data: str | Path | Non
         BagError: A bag exists already or cannot be written.
     """
     path = Path(yaml_path)
-    config = _config(path)
+    config = read_config(path)
     roots = [Path(data)] if data is not None else _roots(path)
     episodes: list[Episode] = []
     refused: list[DataError] = []
@@ -130,20 +59,9 @@ def import_tables(yaml_path: str | Path, out: str | Path, data: str | Path | Non
                 refused.append(found)
     if refused and not episodes:
         raise refused[0]
-    bags = tuple(write_episode(episode, out) for episode in episodes)
+    bags = tuple(write_episode(episode, out, _sources(config)) for episode in episodes)
     remarks = (f"{episode.name}: {remark}" for episode in episodes for remark in episode.remarks)
     return Imported(bags, (*(f"left out: {error}" for error in refused), *remarks))
-
-
-def _config(path: Path) -> ImportConfig:
-    try:
-        return TypeAdapter(ImportConfig).validate_python(dict(read_yaml(path)))
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        hint = nearest(str(first["loc"][-1]), ImportConfig.__dataclass_fields__)
-        hint = hint if first["type"] == "unexpected_keyword_argument" else ""
-        raise ConfigError(f"{path}: {where}: {first['msg']}, found {shown(first['input'])}{hint}") from error
 
 
 def _roots(path: Path) -> list[Path]:
@@ -196,22 +114,36 @@ def _of_file(config: ImportConfig, recordings: Recordings, file: Path) -> Iterat
 
 
 def _episode(config: ImportConfig, table: Table, name: str) -> Episode:
-    time_s = _time(config.time, table)
-    made = [_track(target, columns, time_s, table) for target, columns in config.tracks.items()]
-    tracks = tuple(track for track, _ in made)
-    said = [*table.remarks, *(remark for _, remark in made if remark)]
+    time_s = time_of(config.time, table)
+    rows = len(time_s)
+    tracks, inputs = (
+        [track_of(target, columns, time_s, table, f"{section}.{target}") for target, columns in wanted.items()]
+        for section, wanted in (("tracks", config.tracks), ("inputs", config.inputs))
+    )
+    said = [*table.remarks, *(remark for _, remark in (*tracks, *inputs) if remark)]
     untimed = int(np.sum(~np.isfinite(time_s)))
     if untimed:
-        said.append(f"{untimed} of {len(time_s)} rows have no time and are left out")
-    initial = {
-        target: tuple(_first(_rows(columns, table, len(time_s), f"initial_state.{target}"), f"initial_state.{target}"))
-        for target, columns in config.initial_state.items()
-    }
-    action = {
-        target: _constant(columns, table, len(time_s), f"action.{target}") for target, columns in config.action.items()
-    }
-    start_ns = min((int(track.stamp_ns[0]) for track in tracks), default=_FIRST_STAMP_NS)
-    return Episode(name, config.cell, "", action, start_ns, tracks, initial, remarks=tuple(said))
+        said.append(f"{untimed} of {rows} rows have no time and are left out")
+    return Episode(
+        name,
+        config.cell,
+        "",
+        {target: constant_of(one, table, rows, f"action.{target}") for target, one in config.action.items()},
+        min((int(track.stamp_ns[0]) for track, _ in tracks), default=FIRST_STAMP_NS),
+        tuple(track for track, _ in tracks),
+        {t: first_of(one, table, rows, f"initial_state.{t}") for t, one in config.initial_state.items()},
+        remarks=tuple(said),
+        inputs=tuple(track for track, _ in inputs),
+    )
+
+
+def _sources(config: ImportConfig) -> list[Source]:
+    """Where the bags hold tracks and inputs."""
+    return [
+        Source(one.topic or default_topic(t, one.quantity, drives), t, one.quantity, of=one.of, drives=drives)
+        for wanted, drives in ((config.tracks, False), (config.inputs, True))
+        for t, one in wanted.items()
+    ]
 
 
 def _filled(template: str, table: Table) -> str:
@@ -223,83 +155,3 @@ def _filled(template: str, table: Table) -> str:
     except ValueError as error:
         raise ConfigError(f"name '{template}': {error}") from error
     raise ConfigError(f"name '{template}': expected only {', '.join(f'{{{label}}}' for label in table.labels)}")
-
-
-def _time(time: TimeColumn, table: Table) -> Floats:
-    """(F,) seconds since the first row, increasing; NaN where a row does not say."""
-    if time.column == "":
-        if not time.rate_hz:
-            raise DataError("time: expected a column or a rate_hz")
-        return np.arange(table.rows) / time.rate_hz
-    since = table.seconds(time.column, time.unit_s, "time")
-    if time.nanosec != "":
-        rest = table.column(time.nanosec, "time.nanosec")
-        since = since + (rest - rest[np.isfinite(since)][:1]) * 1e-9
-    known = np.flatnonzero(np.isfinite(since))
-    if not known.size:
-        raise DataError(f"time: column '{time.column}' holds no number")
-    back = np.flatnonzero(np.diff(since[known]) <= 0)
-    if back.size:
-        before, row = known[back[0]], known[back[0] + 1]
-        raise DataError(f"time does not increase in {table.place(row)}: {since[before]:g} s, then {since[row]:g} s")
-    return since
-
-
-def _track(target: str, columns: TrackColumns, time_s: Floats, table: Table) -> tuple[Track, str]:
-    """Track of the rows in which the object was seen, and what there is to say of the others."""
-    size = QUANTITY_SIZE[columns.quantity]
-    if len(columns.columns) != size:
-        raise DataError(f"{target}: expected {size} columns for '{columns.quantity}', found {len(columns.columns)}")
-    values = _rows(columns, table, len(time_s), f"tracks.{target}")
-    timed = np.flatnonzero(np.isfinite(time_s))
-    seen = timed[measured(values[timed], columns.quantity)]
-    if not seen.size:
-        names = ", ".join(str(name) for name in columns.columns if name is not None)
-        raise DataError(f"tracks.{target}: no row of the columns {names} says where {target} is")
-    remark = left_out(
-        values[timed], columns.quantity, f"rows of {target}", lambda index: table.place(int(timed[index]))
-    )
-    stamps = np.asarray(_FIRST_STAMP_NS + np.round(time_s[seen] * 1e9), np.int64)
-    std = np.full(len(stamps), columns.std) if columns.std else None
-    return Track(target, columns.quantity, stamps, values[seen], std), remark
-
-
-def _first(rows: Floats, where: str) -> list[float]:
-    """The first row without a gap."""
-    whole = np.flatnonzero(np.isfinite(rows).all(axis=1))
-    if not whole.size:
-        raise DataError(f"{where}: no row has a number in each of its columns")
-    return [float(number) for number in rows[whole[0]]]
-
-
-def _constant(numbers: Numbers, table: Table, rows: int, where: str) -> float:
-    """The one number of a column. Raises DataError where it varies."""
-    values = _rows(numbers, table, rows, where)[:, 0]
-    known = np.flatnonzero(np.isfinite(values))
-    if not known.size:
-        raise DataError(f"{where}: column '{numbers.columns[0]}' holds no number")
-    first = known[0]
-    other = known[values[known] != values[first]]
-    if other.size:
-        both = f"{values[first]:g} in {table.place(first)}, {values[other[0]]:g} in {table.place(other[0])}"
-        raise DataError(f"{where}: column '{numbers.columns[0]}' varies ({both}); an action is one number a recording")
-    return float(values[first])
-
-
-def _rows(numbers: Numbers, table: Table, rows: int, where: str) -> Floats:
-    """(F, columns) SI numbers. Raises DataError that says where in the YAML they are asked for."""
-    scale = np.array(numbers.scale or (1.0,))
-    offset = np.array(numbers.offset or (0.0,))
-    for name, given in (("scale", scale), ("offset", offset), ("minus", np.array(numbers.minus or (None,)))):
-        if len(given) not in (1, len(numbers.columns)):
-            raise DataError(f"{where}.{name}: expected 1 or {len(numbers.columns)} entries, found {len(given)}")
-    values = _stack(numbers.columns, table, rows, where)
-    return np.asarray((values - _stack(numbers.minus or (None,), table, rows, where)) * scale + offset)
-
-
-def _stack(names: Sequence[str | int | None], table: Table, rows: int, where: str) -> Floats:
-    columns = [np.zeros(rows) if name is None else table.column(name, where) for name in names]
-    for name, column in zip(names, columns, strict=True):
-        if len(column) != rows:
-            raise DataError(f"{where}: column '{name}' has {len(column)} rows, the time has {rows}")
-    return np.stack(columns, axis=1)
