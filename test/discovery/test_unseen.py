@@ -151,7 +151,8 @@ def swings(numbers: tuple[float, ...], seed: int) -> Likelihood:
     true = seen_at + rng.normal(0, 1, seen_at.shape) * PENDULUM.launch_std
     measured = wider.observe(np.tile(np.concatenate([plain.defaults, numbers]), (6, 1)), true, times)
     measured = measured + rng.normal(0, 0.001, measured.shape)
-    data = Recordings(tuple("abcdef"), seen_at, times, measured, times[0], measured, np.array([-np.inf]))
+    said, std = np.array([-np.inf]), np.zeros(seen_at.shape[1])
+    data = Recordings(tuple("abcdef"), seen_at, times, measured, times[0], measured, said, std)
     return pose(plain, data, Noise(np.array([0.001]), 0.0)).likelihood
 
 

@@ -49,4 +49,5 @@ def played(
 
 def _recordings(time_s: Floats, inputs: Floats, measured: Floats) -> Recordings:
     names = tuple(f"shot {i}" for i in range(len(inputs)))
-    return Recordings(names, inputs, time_s, measured, np.zeros(0), np.zeros((len(inputs), 0, 4)), np.full(4, -np.inf))
+    steps, said, std = np.zeros((len(inputs), 0, 4)), np.full(4, -np.inf), np.zeros(inputs.shape[1])
+    return Recordings(names, inputs, time_s, measured, np.zeros(0), steps, said, std)
