@@ -14,12 +14,12 @@ from compass_ros.starter.drives import moved, new_drives
 from compass_ros.starter.matching import Command, Found, Jointed, Placed, find
 from compass_ros.starter.measured import Sensor, command_errors, sensor
 from compass_ros.starter.names import Match
-from compass_ros.starter.priors import guesses, input_name, of_link
+from compass_ros.starter.priors import guesses, input_name, of_link, pushed
 from compass_ros.starter.series import Recordings, read_all
 from compass_ros.starter.text import comment, entry, listed, number, parameter, plain
 
 DRIVEN_S, PASSIVE_S = 5.0, 2.0
-"""Lengths of windows: a robot under control forgets where it began within a second; a passive one amplifies errors."""
+"""Lengths of windows: a robot whose position is controlled forgets where it began within a second; others do not."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,8 @@ def _head(out: Path, scene: Path, model: Path, recordings: Recordings, remarks: 
 
 
 def _series(found: Found, used: Robot, recordings: Recordings) -> Iterator[str]:
-    length = min(DRIVEN_S if found.commands else PASSIVE_S, max(round(min(recordings.seconds) - 0.05, 1), 0.1))
+    held = any(command.kind != "effort" for command in found.commands)
+    length = min(DRIVEN_S if held else PASSIVE_S, max(round(min(recordings.seconds) - 0.05, 1), 0.1))
     yield f"windows: {{length_s: {number(length)}}}"
     if found.commands:
         yield "inputs:"
@@ -99,7 +100,8 @@ def _series(found: Found, used: Robot, recordings: Recordings) -> Iterator[str]:
         name = "joints" if i == 0 else f"joints_{i + 1}"
         starts.append(name)
         yield from _signal(one, name)
-    for other in found.others:
+    driving = [command.jointed.series for command in found.commands]
+    for other in (one for one in found.others if one.series not in driving):
         yield from _other(other)
     for placed in found.placed:
         free = placed.at in {link.name for link in used.links if link.free}
@@ -130,7 +132,7 @@ def _input(command: Command, used: Robot, name: str) -> Iterator[str]:
     )
     yield from _names_said(one.joints)
     joints = [used.joint(m) for m in one.models]
-    free = command.kind == "effort" and not all(j.drive == "effort" for j in joints)
+    free = pushed(command, used)
     pairs = [
         ("name", name),
         ("topic", plain(one.series.held.topic)),

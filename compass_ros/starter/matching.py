@@ -48,7 +48,7 @@ class Command:
     jointed: Jointed
     kind: Kind
     lags: dict[str, Lag]
-    """By joint of the model: how its measured position (speed) follows."""
+    """By joint of the model: how its measured position (speed, acceleration) follows."""
 
     @property
     def linear(self) -> bool:
@@ -96,6 +96,11 @@ def find(recordings: Recordings, robot: Robot) -> Found:
     offered = [*_offered(jointed, measured, notes), *_listed(lists, measured, notes)]
     commands = _covering(offered)
     left = [c for c in offered if c not in commands]
+    if not commands:
+        commands = list(_torques(others, measured))
+        notes += [
+            f"{c.jointed.series.held.topic}: no command was found; its efforts drive the joints" for c in commands
+        ]
     notes += [f"{c.jointed.series.held.topic}: not used: another command is of the same joints" for c in left]
     placed, unplaced = _placed(recordings, robot)
     return Found(tuple(measured), tuple(commands), tuple(others), tuple(placed), (*notes, *unplaced))
@@ -156,6 +161,15 @@ def _offered(jointed: Sequence[Jointed], measured: Sequence[Jointed], notes: lis
             best = max((a.correlation for a in command.lags.values()), default=0.0)
             why = f"positions follow it by {1e3 * late:.0f} ms" if lags else f"correlation {best:.2f} at most"
             notes.append(f"{held.topic} ({held.quantity}): no command: {why}")
+
+
+def _torques(others: Sequence[Jointed], measured: Sequence[Jointed]) -> Iterator[Command]:
+    """Measured efforts that are not one value all along."""
+    of = {m: one for one in measured for m in one.models}
+    for one in others:
+        every = [column.value for m in one.models for column in one.columns(m)]
+        if one.series.held.quantity == "joint_effort" and any(len(v) and np.ptp(v) > 0 for v in every):
+            yield _timed(one, "effort", of)
 
 
 def _timed(one: Jointed, kind: Kind, of: dict[str, Jointed]) -> Command:

@@ -46,6 +46,8 @@ def guesses(robot: Robot, found: Found, inertia: dict[str, float], errors: dict[
     """
     for i, command in enumerate(found.commands):
         yield _delay(input_name(found, i), command)
+        if pushed(command, robot):
+            yield _scale(input_name(found, i))
     commands = {m: command for command in found.commands for m in command.lags}
     for one in found.measured:
         for model in one.models:
@@ -57,6 +59,11 @@ def input_name(found: Found, index: int) -> str:
     return "target" if len(found.commands) == 1 else f"target_{index + 1}"
 
 
+def pushed(command: Command, robot: Robot) -> bool:
+    """Whether efforts act on joints as forces, since not all have a motor."""
+    return command.kind == "effort" and any(robot.joint(m).drive != "effort" for m in command.lags)
+
+
 def of_link(link: Link) -> Iterator[Guess]:
     """The ten numbers of a link's inertia (`cells/made_inertias.py`)."""
     size = made_inertias.size_of(link.mass, link.largest_inertia)
@@ -66,6 +73,11 @@ def of_link(link: Link) -> Iterator[Guess]:
         reach = made_inertias.REACH * width
         name, unit = f"{link.name}@dyna@inertia_{number}", "m" if shift else "1"
         yield Guess(name, f"inertia_log_cholesky[{i}]", link.name, unit, 0.0, -reach, reach, width, "")
+
+
+def _scale(name: str) -> Guess:
+    why = "of the torques, as a motor constant"
+    return Guess(f"{name}@actuation@scale", "input_scale", name, "1", 1.0, 0.2, 5.0, 0.1, why)
 
 
 def _delay(name: str, command: Command) -> Guess:

@@ -155,6 +155,21 @@ def test_without_a_command_there_are_signals_alone(tmp_path: Path) -> None:
     assert read_episodes([tmp_path / "bags"], sources(cell), cell.name)[0].track("red_cube").quantity == "pose"
 
 
+def test_without_a_command_measured_torques_drive(tmp_path: Path) -> None:
+    (tmp_path / "arm.xml").write_text(mjcf(driven=False))
+    time, target, got = moved(0, SECONDS)
+    stamp = stamps(time, 0)
+    source = Source("/joint_states", "e", "joint_effort", of=SAME)
+    effort = Track("e", "joint_effort", stamp, np.ascontiguousarray(60 * (target - got))), source
+    record(tmp_path / "bags", 0, [state("a", "/joint_states", [*SAME], stamp, got), effort])
+    found = start(tmp_path / "arm.xml", [tmp_path / "bags"], tmp_path / "cell.yaml")
+    cell = load(tmp_path / "cell.yaml")
+    assert [(i.quantity, i.to, i.targets) for i in cell.spec.inputs] == [("joint_effort", "qfrc", SAME)]
+    assert any("its efforts drive the joints" in line for line in found.said)
+    assert "target@actuation@scale" in {p.name for p in cell.parameters}
+    assert read_episodes([tmp_path / "bags"], sources(cell), cell.name)[0].inputs[0].value.shape[1] == 2
+
+
 def test_nothing_in_common_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "arm.xml").write_text(mjcf("rotation", "pitch"))
     jointed(["shoulder", "patch"])(tmp_path / "bags", 0, *moved(0, 3.0))
