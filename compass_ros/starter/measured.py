@@ -25,7 +25,7 @@ class Sensor:
     """Of one signal."""
 
     noise: float
-    """One standard deviation: of the noisiest of its numbers, rounding included."""
+    """One standard deviation, rounding included: the median of its numbers, since a calibration measures each again."""
     step: float
     """What all its numbers count in; 0: none, or each in another."""
     rate_hz: float
@@ -46,7 +46,7 @@ def sensor(columns: Sequence[Sequence[Column]]) -> Sensor:
     one = float(np.median(steps)) if np.ptp(steps) <= _ALIKE * steps.max() else 0.0
     gaps = np.concatenate([np.diff(c.stamp_ns) for c in columns[0]])
     rate = 1e9 / float(np.median(gaps)) if len(gaps) else 0.0
-    return Sensor(float(found.sigma.max()), one, rate)
+    return Sensor(float(np.median(found.sigma)), one, rate)
 
 
 def command_errors(found: Found) -> dict[str, float]:
