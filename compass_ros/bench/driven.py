@@ -54,7 +54,7 @@ def excitation(limits: Floats, routine: Routine, seed: int) -> tuple[Floats, Flo
     highest = max(int(routine.fastest_hz / routine.base_hz), 1)
     out = np.zeros((len(time), len(limits)))
     for i, (low, high) in enumerate(limits):
-        middle = 0.5 * (low + high) if np.isfinite(low + high) else 0.0
+        middle = 0.5 * (low + high) if np.isfinite([low, high]).all() else 0.0
         room = min(routine.reach, 0.45 * (high - low))
         orders = rng.choice(np.arange(1, highest + 1), min(routine.harmonics, highest), replace=False)
         phases = rng.uniform(0, 2 * np.pi, len(orders))
