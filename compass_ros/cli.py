@@ -12,6 +12,7 @@ from compass_ros import __version__
 from compass_ros.commands import (
     bench,
     calibrate,
+    check,
     conceal,
     demo,
     diagnose,
@@ -35,7 +36,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for module in (demo, init, plan, track, record, calibrate, evaluate, diagnose, report, policy):
+for module in (demo, init, plan, track, record, check, calibrate, evaluate, diagnose, report, policy):
     module.add_to(app)
 for module in (conceal, unseal, prove, rivals, bench, real, tables):
     module.add_to(app)

@@ -26,6 +26,8 @@ class Checked:
 
     episodes: tuple[Episode, ...]
     """Those to use, mended where that is sure."""
+    recordings: Mapping[str, Episode]
+    """All of them by name, mended and with their time 0 where the motion begins."""
     left_out: tuple[LeftOut, ...]
     """The others, and why."""
     findings: tuple[Finding, ...]
@@ -69,7 +71,7 @@ def check(cell: Cell, episodes: Sequence[Episode]) -> Checked:
         raise DataError(f"no recording holds a motion: {findings[-1].sentence}")
     out = _left_out(named, findings, found.still)
     used = tuple(episode for name, episode in found.episodes.items() if name not in out)
-    return Checked(used, tuple(out.values()), tuple(findings), signals, doubts(cell, used))
+    return Checked(used, found.episodes, tuple(out.values()), tuple(findings), signals, doubts(cell, used))
 
 
 def _looked(

@@ -18,8 +18,11 @@ Kind = Literal["angle", "length", "orientation", "other"]
 SIGMAS = 6.0
 """Normal noise is beyond so many standard deviations in two of 10^9 samples."""
 _LAGS = (1, 2, 3)
+_DIFFERENCES = (((1, -2, 1), 6.0), ((1, -4, 6, -4, 1), 70.0))
+"""Second and fourth differences, with the sums of their squares: the fourth see less of a motion, and more of what
+stands in between."""
 _CALM = 0.2
-"""Of second differences: this share of the smallest are those of noise, even where most samples are spoilt."""
+"""This share of the smallest are those of noise, even where most samples are spoilt."""
 _OF_NORMAL = 0.2533
 """The same quantile of the absolute value of a standard normal number."""
 
@@ -77,15 +80,18 @@ def level(series: Sequence[Series], expected: float) -> Level:
 
 
 def difference_noise(series: Sequence[Floats]) -> float:
-    """Standard deviation of white noise on smooth (F,) series, by the smaller ones of their second differences.
+    """Standard deviation of white noise on smooth (F,) series, by the smaller ones of their differences.
 
     Also where other values stand in between: at one lag of three, neighbours are of one kind.
     """
     found = []
-    for lag in _LAGS:
-        parts = [one[2 * lag :] - 2 * one[lag:-lag] + one[: -2 * lag] for one in series if len(one) > 2 * lag]
-        if parts:
-            found.append(float(np.quantile(np.abs(np.concatenate(parts)), _CALM)) / (_OF_NORMAL * np.sqrt(6)))
+    for weights, gain in _DIFFERENCES:
+        for lag in _LAGS:
+            spaced = np.zeros(lag * (len(weights) - 1) + 1)
+            spaced[::lag] = weights
+            parts = [np.convolve(one, spaced, mode="valid") for one in series if len(one) >= len(spaced)]
+            if parts:
+                found.append(float(np.quantile(np.abs(np.concatenate(parts)), _CALM)) / (_OF_NORMAL * np.sqrt(gain)))
     return min(found, default=0.0)
 
 
