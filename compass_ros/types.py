@@ -68,6 +68,8 @@ NUMBERS: Mapping[Quantity, tuple[str, ...]] = {
 }
 """What the numbers of a row are called, where the quantity itself says it."""
 
+NAMES_SAID = 4
+"""Parameters of a group that a sentence names; the result has all."""
 WRONG = 3.0
 """Error bars from which a parameter has moved: of 64 right ones, one in six calibrations shows one by chance."""
 
@@ -228,10 +230,13 @@ class Together:
 
     @property
     def sentence(self) -> str:
-        """`a : b : c show only as ratios`, without a full stop."""
-        if self.ratios:
+        """`a : b : c show only as ratios`, without a full stop; of many the first ones."""
+        if self.ratios and len(self.parameters) <= NAMES_SAID:
             return f"{' : '.join(self.parameters)} show only as ratios"
-        return f"{', '.join(self.parameters[:-1])} and {self.parameters[-1]} show only together"
+        said = self.parameters[: NAMES_SAID if len(self.parameters) > NAMES_SAID else -1]
+        rest = self.parameters[len(said) :]
+        last = rest[0] if len(rest) == 1 else f"{len(rest)} more"
+        return f"{', '.join(said)} and {last} show only {'as ratios' if self.ratios else 'together'}"
 
 
 @dataclass(frozen=True)

@@ -173,3 +173,6 @@ def test_what_was_screened_out_counts_too(width: float, identified: bool) -> Non
 def test_a_group_says_itself_in_a_sentence() -> None:
     assert Together(("m", "d", "f"), ratios=True).sentence == "m : d : f show only as ratios"
     assert Together(("a", "b", "c"), ratios=False).sentence == "a, b and c show only together"
+    assert Together(tuple("abcd"), ratios=False).sentence == "a, b, c and d show only together"
+    assert Together(tuple("abcde"), ratios=False).sentence == "a, b, c, d and e show only together"
+    assert Together(tuple("abcdefg"), ratios=True).sentence == "a, b, c, d and 3 more show only as ratios"
