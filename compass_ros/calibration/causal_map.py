@@ -73,9 +73,7 @@ def to_estimate(problem: Problem, refined: Refined, trace: tuple[Iteration, ...]
     std[free] = errors
     identifiable = np.zeros(len(std), bool)
     identifiable[free] = refined.alone < IDENTIFIED
-    shared = together(
-        refined.covariance[: len(free), : len(free)], identifiable[free], values[free], [parameters[i] for i in free]
-    )
+    shared = together(refined.among, identifiable[free], values[free], [parameters[i] for i in free])
     graph = intervention_graph(problem, refined)
     floor = refined.chi_square < 1.2
     reason = f"chi-square {refined.chi_square:.2f}: " + (

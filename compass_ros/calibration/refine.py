@@ -114,6 +114,8 @@ class Refined:
     """The one that was maximised at last: its sigma holds the simulator's roughness."""
     covariance: Floats
     """(n, n) of free parameters, then launches, in units of the prior's standard deviations."""
+    among: Floats
+    """(p, p) the same of the free parameters, without what was screened out (nothing, where there are not hundreds)."""
     alone: Floats
     """(p,) standard deviation of each free parameter if the others' priors were wider (`identifiability.alone`)."""
     chi_square: float
@@ -179,7 +181,7 @@ def concluded(rough: Likelihood, fit: Fit, influence: Influence) -> Refined:
         factor[: len(felt)] = coupling(influence.gram, felt, share)
         spread = spread * np.outer(factor, factor)
         coupled = coupling(influence.gram, felt, WIDER**2 * share)
-    return Refined(fit, rough, spread, alone(among, coupled), chi_square(rough, fit), influence)
+    return Refined(fit, rough, spread, among, alone(among, coupled), chi_square(rough, fit), influence)
 
 
 def freed(

@@ -100,8 +100,7 @@ def said(found: Refined) -> tuple[list[bool], tuple[Together, ...]]:
     free, parameters = found.fit.free, found.likelihood.parameters
     identified = np.zeros(len(parameters), bool)
     identified[free] = found.alone < IDENTIFIED
-    own = found.covariance[: len(free), : len(free)]
-    groups = together(own, identified[free], found.fit.point.values[free], [parameters[i] for i in free])
+    groups = together(found.among, identified[free], found.fit.point.values[free], [parameters[i] for i in free])
     return identified.tolist(), groups
 
 
