@@ -44,13 +44,12 @@ def _many(count: int) -> str:
 def _table(rows: Sequence[Figures]) -> Table:
     table = Table(box=box.MINIMAL_HEAVY_HEAD, pad_edge=False, show_edge=False)
     table.add_column("signal", overflow="fold")
-    for heading in ("samples", "Hz", "gaps", "noise", "step", "still", "stuck", "used", "delay"):
+    for heading in ("Hz", "gaps", "noise", "step", "still", "stuck", "used", "delay"):
         table.add_column(Text(heading), justify="right", no_wrap=True)
     for row in rows:
         delay = f"{plain(1e3 * row.delay_s, 3)} ms" if math.isfinite(row.delay_s) else MISSING
         table.add_row(
             Text(f"{row.signal} [m{row.unit}]" if row.unit else row.signal),
-            str(row.samples),
             plain(row.rate_hz, 3),
             str(row.gaps),
             _thousandths(row.noise, row.unit),

@@ -14,6 +14,9 @@ from compass_ros.episodes.trajectories import executed
 from compass_ros.errors import BagError
 from compass_ros.types import Bools, Floats, Track
 
+OFTEN = 2
+"""A clock is set back once or twice in a recording; between two publishers with clocks of their own it always is."""
+
 
 def tracks(
     source: Source, streams: Mapping[Stream, Rows], noted_std: Sequence[float] | None
@@ -101,7 +104,8 @@ def _check_order(source: Source, column: int, rows: Rows) -> None:
         step = int(stamps[index] - stamps[index - 1])
         how = f"{-step} ns before the one before it" if step else "as is the one before it"
         what = f"message {index + 1} of {source.wanted[column] if source.of else source.object}"
-        raise BagError(f"{source.topic}: stamps out of order: {what} is stamped {stamps[index]} ns, {how}")
+        many = f"; {backwards.size} stamps go back: two publishers on the topic?" if backwards.size > OFTEN else ""
+        raise BagError(f"{source.topic}: stamps out of order: {what} is stamped {stamps[index]} ns, {how}{many}")
 
 
 def _gathered(rows: Rows) -> Rows:

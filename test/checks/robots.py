@@ -133,8 +133,13 @@ def cell(name: str, folder: Path, seed: int = 0, horizon: int = 60) -> Cell:
     (folder / f"{name}.xml").write_text(robot.scene)
     field, _, of = robot.parameter.partition("/")
     model = mujoco.MjModel.from_xml_string(robot.scene)
-    value = {"opt.gravity[2]": -9.81, "body_mass": 0.2, "servo_gain": 1.0}.get(field, 0.01)
-    value = float(model.actuator_gainprm[0, 0]) if field == "servo_gain" else value
+    true = {
+        "dof_damping": lambda: 0.6 * float(model.joint(of).damping[0]),
+        "servo_gain": lambda: float(model.actuator_gainprm[0, 0]),
+        "body_mass": lambda: 0.2,
+        "opt.gravity[2]": lambda: -9.81,
+    }
+    value = true[field]()
     low, high = sorted((0.2 * value, 3 * value))
     lines = [
         f"name: {name}",
@@ -143,10 +148,7 @@ def cell(name: str, folder: Path, seed: int = 0, horizon: int = 60) -> Cell:
         "control_dt_s: 0.05",
         f"horizon: {horizon}",
         "objects:",
-        *(
-            f"  - {{name: {o}, quantity: {q}, topic: /{o if q != 'joint' else 'joint_states'}}}"
-            for o, q in robot.objects
-        ),
+        *(f"  - {{name: {o}, quantity: {q}}}" for o, q in robot.objects),
         f"factors: [{', '.join(o for o, _ in robot.objects)}]",
         "parameters:",
         f"  - {{name: a@dyna@b, field: '{field}', of: '{of}', unit: '1', default: {value},",
