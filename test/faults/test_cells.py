@@ -1,0 +1,28 @@
+"""Ten small cells drawn at random, of every kind of joint, passive and driven: each ends in a result or in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from compass_ros.cells import load
+from test.faults.fuzz_cells import attempt
+from test.faults.random_cells import SMALL, drawn
+
+pytestmark = pytest.mark.slow
+
+SEEDS = range(10)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_cell_ends_in_a_result_or_in_one_line(tmp_path: Path, seed: int) -> None:
+    attempt(tmp_path, seed, SMALL)
+
+
+def test_the_same_seed_is_the_same_cell(tmp_path: Path) -> None:
+    folders = [tmp_path / name for name in ("one", "two")]
+    for folder in folders:
+        folder.mkdir()
+        drawn(folder, 3)
+    assert load(folders[0] / "cell.yaml").hash == load(folders[1] / "cell.yaml").hash
