@@ -15,7 +15,7 @@ import numpy as np
 from compass_ros.calibration.noise import measure_noise
 from compass_ros.cells import Cell
 from compass_ros.operation.current import Current, current
-from compass_ros.pipeline import launched
+from compass_ros.posing import launched
 from compass_ros.reporting.from_json import from_json
 from compass_ros.reporting.result_json import read_result
 from compass_ros.simulation.replay import recordings

@@ -18,7 +18,8 @@ from compass_ros.cells import load
 from compass_ros.config import calibration_config
 from compass_ros.episodes import read_episodes
 from compass_ros.operation.current import sources
-from compass_ros.pipeline import calibrate, launched
+from compass_ros.pipeline import calibrate
+from compass_ros.posing import launched
 from compass_ros.reporting.result_json import read_result
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import recordings

@@ -8,13 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compass_ros import pipeline
+from compass_ros import estimation, pipeline
+from compass_ros.assembly import assemble
 from compass_ros.calibration.noise import Noise, measure_noise
 from compass_ros.cells import load
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery, not_evaluated
 from compass_ros.errors import DataError
-from compass_ros.pipeline import assemble, calibrate, evenly, launched, noise_floor, split
+from compass_ros.pipeline import calibrate, evenly, split
+from compass_ros.posing import launched, noise_floor
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import Replay, recordings
 from compass_ros.types import Episode, Estimate, Progress, Result, Track
@@ -177,7 +179,7 @@ def test_no_method_ends_farther_than_it_began(
     far = cell().values({"pusher@actuation@vel_discount": 0.5})
     sure = np.zeros(len(far), dtype=bool)
     bad = Estimate(name, far, 0.01 * np.abs(far), sure, None, (), 0, True, "done")
-    monkeypatch.setattr(pipeline, "_estimate", lambda *_: (bad, None))
+    monkeypatch.setattr(estimation, "_estimate", lambda *_: (bad, None))
     result, _ = calibrate(episodes, cell(), replace(CONFIG, method=name))
     assert found(result) == cell().defaults.tolist()
     assert result.gap["calibrated"] == result.gap["nominal"]

@@ -11,7 +11,7 @@ from compass_ros.calibration.noise import measure_noise
 from compass_ros.calibration.problem import Problem
 from compass_ros.cells import Cell, load
 from compass_ros.errors import ConfigError
-from compass_ros.pipeline import pose
+from compass_ros.posing import pose
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import Replay, recordings
 from compass_ros.types import QUANTITY_SIZE, Episode, Floats, Track

@@ -14,7 +14,19 @@ from compass_ros.reporting.atomic import write_text
 
 Line = Mapping[str, Any]
 PACKAGE = Path(__file__).parents[1]
-METHOD = ("calibration", "discovery", "simulation", "cells", "pipeline.py", "results.py", "types.py", "config.py")
+METHOD = (
+    "calibration",
+    "discovery",
+    "simulation",
+    "cells",
+    "posing.py",
+    "estimation.py",
+    "assembly.py",
+    "pipeline.py",
+    "results.py",
+    "types.py",
+    "config.py",
+)
 WORLDS = ("concealed", "cells", "proof/one_world.py")
 
 

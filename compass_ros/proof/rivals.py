@@ -15,7 +15,17 @@ from compass_ros.proof.one_world import SUITES, Suite, concealed
 
 METHOD = "rivals"
 """The method in the lines of the results file."""
-PARTS = ("rivals", "calibration", "simulation", "cells", "pipeline.py", "types.py", "config.py")
+PARTS = (
+    "rivals",
+    "calibration",
+    "simulation",
+    "cells",
+    "posing.py",
+    "estimation.py",
+    "pipeline.py",
+    "types.py",
+    "config.py",
+)
 """What their numbers depend on."""
 
 

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from compass_ros.cells import Cell
 from compass_ros.config import CalibrationConfig
-from compass_ros.pipeline import estimate_parameters
+from compass_ros.estimation import estimate_parameters
 from compass_ros.rivals.calibrated import Calibrated, calibrate_plain, problems, rms
 from compass_ros.types import Episode
 

@@ -16,7 +16,7 @@ from compass_ros.discovery.choice import PREDICTS, Choice
 from compass_ros.discovery.choose import simplest
 from compass_ros.discovery.joint import Joint
 from compass_ros.discovery.unseen import HELD_OUT_SEEN, Prediction, held_out, unexpected
-from compass_ros.pipeline import pose
+from compass_ros.posing import pose
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.simulation.replay import Recordings

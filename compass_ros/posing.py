@@ -1,0 +1,98 @@
+"""Recordings and a simulator as the problem that every method is given, and how far the two are apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.noise import Noise
+from compass_ros.calibration.problem import Problem
+from compass_ros.calibration.refine import with_launches
+from compass_ros.cells import Cell
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.factors import factor_distance
+from compass_ros.simulation.manifold import apart, charted, on_manifold
+from compass_ros.simulation.replay import Recordings, Replay, floored, rms_distance
+from compass_ros.types import Floats, Gap
+
+
+class Yardstick:
+    """How far a simulator is from recordings, as it is reported; what was asked once is not simulated again."""
+
+    def __init__(self, simulator: Simulator, data: Recordings, noise: Noise) -> None:
+        self._asked = (simulator, data, noise)
+        self._known: dict[bytes, tuple[Replay, Gap]] = {}
+
+    def replay(self, values: Floats) -> Replay:
+        """Of (P,) values, each episode with the launch that agrees best with it."""
+        return self._at(values)[0]
+
+    def gap(self, values: Floats, noise: Floats) -> Gap:
+        """As `Replay.gap` has it."""
+        return floored(self._asked[0], self._at(values)[1], noise)
+
+    def distance(self, values: Floats) -> float:
+        """rms distance [m or rad]."""
+        return self._at(values)[1].rmse_m
+
+    def _at(self, values: Floats) -> tuple[Replay, Gap]:
+        key = values.tobytes()
+        if key not in self._known:
+            replay = launched(*self._asked, values)
+            self._known[key] = replay, replay.gap(values)
+        return self._known[key]
+
+
+def pose(simulator: Simulator, data: Recordings, noise: Noise, yardstick: Yardstick | None = None) -> Problem:
+    """Recordings and a simulator as the problem that every method is given."""
+    cell = simulator.cell
+    replay = Replay(simulator, data)
+    likelihood = Likelihood(
+        predict=simulator.observe,
+        predict_alike=simulator.observe_alike,
+        difference=partial(apart, cell),
+        windowed=cell.spec.windows is not None,
+        parameters=simulator.parameters,
+        inputs=simulator.inputs(data.inputs),
+        time_s=data.time_s,
+        measured=np.where(cell.fitted, charted(cell, data.measured), np.nan),
+        sigma=on_manifold(cell, noise.of(data.measured)),
+        correlation_time=noise.correlation_time,
+        launch_std=simulator.launch_std(simulator.defaults, data.start_std),
+        prior_mean=simulator.defaults,
+        prior_std=np.array([p.half_width for p in simulator.parameters]),
+    )
+    return Problem(
+        differences=replay.differences,
+        trajectories=replay.predict,
+        measured=np.nan_to_num(data.measured),
+        weight=np.where(np.isnan(data.measured) | ~cell.fitted, 0.0, 1 / noise.of(data.measured)),
+        actions=data.inputs,
+        parameters=simulator.parameters,
+        factors=tuple(f.name for f in cell.factors),
+        start=simulator.defaults,
+        simulated_seconds=cell.duration,
+        apart=partial(factor_distance, cell),
+        distance=(yardstick or Yardstick(simulator, data, noise)).distance,
+        likelihood=likelihood,
+    )
+
+
+def launched(simulator: Simulator, data: Recordings, noise: Noise, values: Floats) -> Replay:
+    """A replay of (P,) values in which each episode has the launch that agrees best with it.
+
+    How an arm repeats itself, or a first state that was measured with noise, differs from shot to shot: it says
+    nothing about a simulator. Where the cell calls its launches exact they stay as commanded.
+    """
+    likelihood = replace(
+        pose(simulator, data, noise).likelihood, launch_std=simulator.launch_std(values, data.start_std)
+    )
+    return Replay(simulator, data, with_launches(likelihood, values).launch)
+
+
+def noise_floor(cell: Cell, noise: Noise) -> float:
+    """Root mean square distance that the noise alone leaves [m]: of positions, as in `Gap.rmse_m`."""
+    return rms_distance(cell, noise.rms[None, None])
