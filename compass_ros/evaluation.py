@@ -14,13 +14,14 @@ import numpy as np
 
 from compass_ros.calibration.noise import measure_noise
 from compass_ros.cells import Cell
+from compass_ros.checks.check import check
 from compass_ros.operation.current import Current, current
 from compass_ros.posing import launched
 from compass_ros.reporting.from_json import from_json
 from compass_ros.reporting.result_json import read_result
 from compass_ros.simulation.replay import recordings
-from compass_ros.simulation.windows import windows
-from compass_ros.types import Episode, Gap
+from compass_ros.simulation.windows import usable, windows
+from compass_ros.types import Episode, Gap, LeftOut
 
 Model = Literal["nominal", "calibrated", "with_laws"]
 
@@ -46,6 +47,8 @@ class Evaluation:
     windows: int
     """How many episodes or windows were compared."""
     models: Mapping[Model, Judged]
+    left_out: tuple[LeftOut, ...]
+    """Recordings that could not be compared, and why."""
 
 
 def evaluate(cell: Cell, version: Path, episodes: Sequence[Episode], threads: int = 0) -> Evaluation:
@@ -62,14 +65,17 @@ def evaluate(cell: Cell, version: Path, episodes: Sequence[Episode], threads: in
     }
     if fitted.simulator.effects:
         models["with_laws"] = fitted
-    data = recordings(cell, windows(cell, episodes))
+    checked = check(cell, episodes)
+    sound, without_motion = usable(cell, checked.episodes)
+    data = recordings(cell, windows(cell, sound))
     noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
     gaps = {}
     for name, model in models.items():
         simulator = model.simulator.driven(data.drives)
         gaps[name] = launched(simulator, data, noise, model.values).gap(model.values, noise.rms)
     judged = {name: Judged(gap, removed(gaps["nominal"], gap)) for name, gap in gaps.items()}
-    return Evaluation(cell.name, tuple(dict.fromkeys(data.recording)), len(data.names), judged)
+    left_out = (*checked.left_out, *without_motion)
+    return Evaluation(cell.name, tuple(dict.fromkeys(data.recording)), len(data.names), judged, left_out)
 
 
 def removed(nominal: Gap, gap: Gap) -> dict[str, float]:

@@ -24,7 +24,7 @@ from compass_ros.posing import Yardstick, pose
 from compass_ros.progress import Steady
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import recordings
-from compass_ros.simulation.windows import windows
+from compass_ros.simulation.windows import usable, windows
 from compass_ros.types import Episode, Estimate, Report, Result, silent
 
 Keep = Callable[[Result, Discovery], object]
@@ -45,13 +45,15 @@ def calibrate(
     The same episodes, cell and configuration give the same result, bit for bit. Wall time is for the caller to add.
     """
     checked = check(cell, episodes)
-    used, steady = evenly(checked.episodes, config.episodes), Steady(report)
+    sound, without_motion = usable(cell, checked.episodes)
+    used, steady = evenly(sound, config.episodes), Steady(report)
     first = CALIBRATION if config.discover else 1.0
     simulator = Simulator(cell, threads=config.threads)
     told: list[str] = []
+    left_out = (*checked.left_out, *without_motion)
 
     def noted(result: Result) -> Result:
-        return replace(result, warnings=(*told, *checked.said, *result.warnings), left_out=checked.left_out)
+        return replace(result, warnings=(*told, *checked.said, *result.warnings), left_out=left_out)
 
     for turn in range(2):
         fit, held_out = split(used, config, turn)
@@ -87,8 +89,8 @@ def calibrate(
     result = assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, found, yardsticks)
     if estimate.note:
         told.append(estimate.note)
-    if len(used) < len(checked.episodes):
-        said = f"{len(used)} of {len(checked.episodes)} episodes were used, evenly over the order of recording"
+    if len(used) < len(sound):
+        said = f"{len(used)} of {len(sound)} episodes were used, evenly over the order of recording"
         told.append(f"{said}; the option `episodes` takes more")
     return noted(result), found
 

@@ -36,9 +36,10 @@ def evaluate(
     loaded = load(cell or _cell_of(folder, content))
     reading = read_usable(loaded, bags)
     said = judge(loaded, folder, reading.episodes, threads)
-    left_out = [asdict(one) for one in reading.left_out]
-    typer.echo(json.dumps(to_json(said) | {"left_out": left_out}, indent=1)) if as_json else show(said)
-    for one in reading.left_out:
+    left_out = (*reading.left_out, *said.left_out)
+    listed = {"left_out": [asdict(one) for one in left_out]}
+    typer.echo(json.dumps(to_json(said) | listed, indent=1)) if as_json else show(said)
+    for one in left_out:
         typer.echo(f"note: {one}", err=True)
 
 

@@ -42,12 +42,14 @@ class Current:
     def residuals(self, episodes: Sequence[Episode]) -> Residuals:
         """Where and how far the recordings of planar objects are from their replay. Raises DataError, ConfigError."""
         replay = self._replay(episodes)
-        every = np.arange(len(episodes))
-        predicted = replay.predict(np.tile(self.values, (len(episodes), 1)), every)
+        every = np.arange(len(replay.data.names))
+        predicted = replay.predict(np.tile(self.values, (len(every), 1)), every)
         return Residuals(self.cell, replay.data, predicted)
 
     def _replay(self, episodes: Sequence[Episode]) -> Replay:
-        return Replay(self.simulator, recordings(self.cell, episodes))
+        """Of the episodes, or of the windows of long recordings, each with what drove it."""
+        data = recordings(self.cell, windows(self.cell, episodes))
+        return Replay(self.simulator.driven(data.drives), data)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from compass_ros.cells.drives import Drive
 from compass_ros.cells.signals import Signal
 from compass_ros.cells.start import state_names
 from compass_ros.errors import DataError
-from compass_ros.types import Episode, Floats, Ints, Track
+from compass_ros.types import Episode, Floats, Ints, LeftOut, Track
 
 AROUND_S = 0.05
 """Frames so near the start of a window give its first state [s]: a joint's acceleration changes over that time by
@@ -52,6 +52,28 @@ def windows(cell: Cell, episodes: Sequence[Episode]) -> list[Episode]:
     return out
 
 
+def usable(cell: Cell, recordings: Sequence[Episode]) -> tuple[list[Episode], tuple[LeftOut, ...]]:
+    """Recordings that have a window in which something moves; the others, and why.
+
+    Raises DataError where none has.
+    """
+    chosen: list[Episode] = []
+    out: list[LeftOut] = []
+    refused: DataError | None = None
+    for recording in recordings:
+        try:
+            windows(cell, [recording])
+            drive(cell, recording)
+        except DataError as error:
+            refused = error
+            out.append(LeftOut(recording.source or recording.name, str(error)))
+        else:
+            chosen.append(recording)
+    if refused is not None and not chosen:
+        raise refused
+    return chosen, tuple(out)
+
+
 def drive(cell: Cell, episode: Episode) -> Drive:
     """The recorded inputs of an episode, on its own clock. Raises DataError where one is missing."""
     known = {track.object: track for track in episode.inputs}
@@ -71,6 +93,8 @@ def _without_gaps(track: Track) -> Floats:
     out = np.empty_like(track.value)
     for column, values in enumerate(track.value.T):
         seen = np.flatnonzero(~np.isnan(values))
+        if not len(seen):
+            raise DataError(f"input '{track.object}': its number {column + 1} is in no message")
         out[:, column] = values[seen[np.maximum(np.searchsorted(seen, rows, side="right") - 1, 0)]]
     return out
 
@@ -78,6 +102,8 @@ def _without_gaps(track: Track) -> Floats:
 def _cut(cell: Cell, episode: Episode, length_s: float) -> Iterator[Episode]:
     """Windows of one recording. Raises DataError where inputs and signals share less than half a window."""
     series = [t for t in (*episode.tracks, *episode.inputs) if len(t.stamp_ns)]
+    if not series:
+        raise DataError(f"{episode.source or episode.name}: no inputs and no signals in it")
     begin = max(int(t.stamp_ns[0]) for t in series)
     end = min(int(t.stamp_ns[-1]) for t in series)
     length = round(length_s / _NS)
@@ -186,6 +212,8 @@ def _near(track: Track, start_ns: int, columns: list[int]) -> Ints:
     """Frames around a moment: within AROUND_S of it, at least FEWEST and at most MOST of them."""
     away = np.abs(track.stamp_ns - start_ns)
     seen = np.flatnonzero(~np.isnan(track.value[:, columns]).any(axis=1))
+    if not len(seen):
+        raise DataError(f"signal '{track.object}': its number {columns[0] + 1} is in no message")
     order = seen[np.argsort(away[seen], kind="stable")]
     count = int(np.clip(np.sum(away[seen] <= AROUND_S / _NS), FEWEST, MOST))
     return np.sort(order[:count])

@@ -12,10 +12,12 @@ from scipy.spatial.transform import Rotation
 from compass_ros.cells import Cell, load
 from compass_ros.config import calibration_config
 from compass_ros.errors import DataError
+from compass_ros.operation.current import Current
 from compass_ros.pipeline import calibrate
+from compass_ros.simulation import Simulator
 from compass_ros.simulation.manifold import apart, charted, on_manifold
 from compass_ros.simulation.replay import recordings
-from compass_ros.simulation.windows import windows
+from compass_ros.simulation.windows import usable, windows
 from compass_ros.types import Episode, Floats, Track
 from test.series.arms import CELL, START_NS, episode, recorded, write_cell
 
@@ -90,6 +92,39 @@ def test_a_recording_without_motion_or_too_short_is_one_line(tmp_path: Path) -> 
         windows(cell, [episode("run", time, still, still)])
     with pytest.raises(DataError, match=r"expected at least 1 s"):
         windows(cell, [episode("run", time[:40], still[:40], still[:40])])
+
+
+@pytest.mark.parametrize("lacks", ["motion", "length", "target", "one angle", "one target", "everything"])
+def test_a_recording_without_windows_costs_the_others_nothing(tmp_path: Path, lacks: str) -> None:
+    cell = load(write_cell(tmp_path))
+    sound, bad = recorded(4.0, 1), recorded(4.0, 2)
+    (joints,), (target,) = bad.tracks, bad.inputs
+    lost = [replace(one, value=one.value * np.array([1.0, np.nan])) for one in (joints, target)]
+    bad = {
+        "motion": replace(bad, tracks=(replace(joints, value=0 * joints.value),)),
+        "length": replace(bad, tracks=(replace(joints, stamp_ns=joints.stamp_ns[:30], value=joints.value[:30]),)),
+        "target": replace(bad, inputs=()),
+        "one angle": replace(bad, tracks=(lost[0],)),
+        "one target": replace(bad, inputs=(lost[1],)),
+        "everything": replace(bad, tracks=(), inputs=()),
+    }[lacks]
+    chosen, left_out = usable(cell, [sound, bad])
+    assert [e.name for e in chosen] == ["run1"]
+    assert [one.bag for one in left_out] == ["run2"]
+    assert "\n" not in left_out[0].reason
+    with pytest.raises(DataError):
+        usable(cell, [bad])
+
+
+def test_the_running_check_compares_windows_with_what_drove_them(tmp_path: Path) -> None:
+    """The gap of a simulator in force, in a driven cell: small where it is right, large where it is not."""
+    cell = load(write_cell(tmp_path))
+    simulator = Simulator(cell, threads=1)
+    truth = cell.values({"shoulder@dyna@damping": 0.8, "shoulder@actuation@gain": 80, "elbow@actuation@delay": 0.03})
+    run = recorded(8.0, 3, delay_s=0.03)
+    right, wrong = (Current(simulator, values).gap(run) for values in (truth, simulator.defaults))
+    assert right < 0.2 * wrong
+    assert Current(simulator, truth).residuals([run]).predicted.shape[0] == 4
 
 
 def test_numbers_that_a_message_lacked_are_left_out_of_one_joint_alone(tmp_path: Path) -> None:
