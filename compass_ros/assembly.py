@@ -10,6 +10,7 @@ import numpy as np
 from compass_ros.calibration.identifiability import IDENTIFIED
 from compass_ros.calibration.noise import Noise
 from compass_ros.cells import Cell
+from compass_ros.cells.signals import Signal
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery
 from compass_ros.discovery.floor import honest
@@ -95,7 +96,7 @@ def _draw(cell: Cell, data: Recordings, models: dict[str, tuple[Replay, Floats]]
     predicted = {
         name: replay.predict(np.tile(values, (len(episodes), 1)), episodes) for name, (replay, values) in models.items()
     }
-    columns = {s.name: list(range(s.first, s.columns.stop)) for s in cell.signals}
+    columns = {name: own for signal in cell.signals for name, own in _drawn_together(signal).items()}
     out = []
     for e, name in enumerate(data.names):
         tracks = []
@@ -114,3 +115,11 @@ def _draw(cell: Cell, data: Recordings, models: dict[str, tuple[Replay, Floats]]
             )
         out.append(Drawn(name, held_out, tuple(tracks)))
     return tuple(out)
+
+
+def _drawn_together(signal: Signal) -> dict[str, list[int]]:
+    """Columns of an observation that are one track: all numbers of a body, of a signal of joints each by itself."""
+    own = range(signal.first, signal.columns.stop)
+    if signal.jointed and signal.size > 1:
+        return {f"{signal.name}.{number}": [column] for number, column in zip(signal.numbers, own, strict=True)}
+    return {signal.name: list(own)}

@@ -83,8 +83,10 @@ def show(said: Evaluation) -> None:
     from rich.text import Text
 
     from compass_ros.reporting.numbers import thousandths
+    from compass_ros.reporting.table import NARROW
 
-    table = Table(title=f"{len(said.recordings)} recordings, {said.windows} compared", title_justify="left")
+    compared = f"recordings: {len(said.recordings)}, in {said.windows} parts"
+    table = Table(caption=Text(compared, "dim"), caption_justify="left", **NARROW)
     table.add_column("signal")
     table.add_column("unit")
     table.add_column("floor", justify="right")

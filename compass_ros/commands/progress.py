@@ -39,6 +39,6 @@ class Bar:
         self._bar.stop()
 
     def __call__(self, progress: Progress) -> bool:
-        gap = f"gap {progress.gap:.3f} m" if math.isfinite(progress.gap) else ""
+        gap = f"gap {progress.gap:.3f}" if math.isfinite(progress.gap) else ""
         self._bar.update(self._task, completed=progress.done, description=progress.stage, gap=gap)
         return True

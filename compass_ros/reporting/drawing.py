@@ -158,6 +158,7 @@ def _iterations(result: Result, extras: ReportExtras) -> dict[str, Any]:
     return {
         "rollouts": [it.rollouts for it in traced],
         "parameters": parameters,
+        "difference_unit": result.unit,
         "difference_rollouts": [it.rollouts for it in differences],
         "difference": {f: numbers(np.array([it.difference[k] for it in differences])) for k, f in enumerate(factors)},
         "sparsity": sparsity,

@@ -186,3 +186,5 @@ def test_a_driven_arm_is_calibrated_to_the_noise(tmp_path: Path) -> None:
     assert set(gap.parts) == {"shoulder", "elbow"}
     assert result.gap["nominal"]["held_out"].signals["joints"].rms > 0.005
     assert result.graph.factors == ("joints.shoulder", "joints.elbow")
+    drawn = result.replays[0].tracks  # a pair of angles is no place in the plane
+    assert [(track.object, track.real.shape[1]) for track in drawn] == [("joints.shoulder", 1), ("joints.elbow", 1)]

@@ -14,9 +14,9 @@ const drawDifference = (target) => {
   const names = Object.keys(calibration.difference), shades = ["calibrated", "with_effects", "nominal", "ink", "bad", "note"];
   draw(target, names.map((name, i) => ({
     x: calibration.difference_rollouts, y: calibration.difference[name], type: "scatter", mode: "lines+markers", name: text(name),
-    line: { color: colour(shades[i % shades.length]), width: 1.8 }, marker: { size: 5 }, hovertemplate: `%{y:.4g} m ${text(name)}<extra></extra>`,
+    line: { color: colour(shades[i % shades.length]), width: 1.8 }, marker: { size: 5 }, hovertemplate: `%{y:.4g} ${calibration.difference_unit} ${text(name)}<extra></extra>`,
   })), {
-    hovermode: "x unified", xaxis: spent(), yaxis: axis({ title: label("m"), rangemode: "tozero", nticks: 5 }), showlegend: true,
+    hovermode: "x unified", xaxis: spent(), yaxis: axis({ title: label(calibration.difference_unit), rangemode: "tozero", nticks: 5 }), showlegend: true,
     legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 11 } }, margin: { l: 8, r: 8, t: 28, b: 4 },
   });
 };
