@@ -17,8 +17,8 @@ from rich.table import Table
 from rich.text import Text
 
 from compass_ros.cells import Cell
-from compass_ros.commands.plan import Planned
 from compass_ros.discovery.plan import TWIN, Plan, Seen, Visible, widest
+from compass_ros.planning.shots import Planned
 from compass_ros.reporting.atomic import write_text
 from compass_ros.reporting.figures import STYLE, save
 from compass_ros.reporting.palette import LIGHT

@@ -13,9 +13,9 @@ import yaml
 from rich.console import Console
 
 from compass_ros.cli import main
-from compass_ros.commands.plan import Planned, look, read_shots
 from compass_ros.commands.plan_output import figure, print_plan, write_plan
 from compass_ros.errors import ConfigError, DataError
+from compass_ros.planning.shots import Planned, look, read_shots
 from test.discovery.planted import CALM, HELD_OUT
 from test.simulation.table import cell, simulator
 
