@@ -146,4 +146,7 @@ def _share_file(type_name: str, suffix: str) -> str:
         if path.is_file():
             return path.read_text(encoding="utf-8")
     where = f"share/{package}/msg/{name}{suffix}"
-    raise BagError(f"no definition of {type_name} is installed; looked for {where} in {', '.join(prefixes)}")
+    raise BagError(
+        f"no definition of {type_name} is installed: the package {package} is missing, or its workspace was not "
+        f"sourced; looked for {where} in {', '.join(prefixes)}"
+    )

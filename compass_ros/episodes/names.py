@@ -10,7 +10,6 @@ from collections.abc import Iterable
 from compass_ros.errors import BagError
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
-_NUMBERED = re.compile(r"episode_(\d{4,9})")
 
 
 def episode_name(name: str) -> str:
@@ -38,7 +37,8 @@ def safe_name(text: str) -> str:
     return f"{readable}-{hashlib.sha256(composed.encode(errors='surrogateescape')).hexdigest()[:6]}"
 
 
-def next_name(taken: Iterable[str]) -> str:
+def next_name(taken: Iterable[str], stem: str = "episode") -> str:
     """`episode_0001`, or one more than the highest number among the names taken."""
-    numbers = [int(match[1]) for match in map(_NUMBERED.fullmatch, taken) if match]
-    return f"episode_{max(numbers, default=0) + 1:04d}"
+    numbered = re.compile(rf"{stem}_(\d{{4,9}})")
+    numbers = [int(match[1]) for match in map(numbered.fullmatch, taken) if match]
+    return f"{stem}_{max(numbers, default=0) + 1:04d}"

@@ -14,6 +14,7 @@ from compass_ros.episodes.clocks import on_one_clock
 from compass_ros.episodes.definitions import EPISODE_TYPES, SHOT_TYPES, STRING_TYPE
 from compass_ros.episodes.messages import KINDS
 from compass_ros.episodes.notes import (
+    EPISODE_TOPIC,
     NOTES_TOPIC,
     SHOT_TOPIC,
     EpisodeHeader,
@@ -158,7 +159,7 @@ class _Content:
         topic = message.topic
         if topic.ros1:
             pass  # our own messages are ROS 2 ones
-        elif topic.type in EPISODE_TYPES:
+        elif topic.name == EPISODE_TOPIC and topic.type in EPISODE_TYPES:
             if not self.headers:
                 self._begin()
             self.headers.append(header(decode(message)))

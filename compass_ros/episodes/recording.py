@@ -10,28 +10,20 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 
-from compass_ros.episodes.definitions import EPISODE_TYPE, SHOT_TYPE, Definition, embedded_definition
+from compass_ros.episodes.connection import Connection
+from compass_ros.episodes.definitions import EPISODE_TYPE, SHOT_TYPE, embedded_definition
 from compass_ros.episodes.latched import Latched
 from compass_ros.episodes.names import episode_name, next_name
 from compass_ros.episodes.notes import EPISODE_TOPIC, SHOT_TOPIC, EpisodeHeader, Shot, State, header_bytes, shot_bytes
 from compass_ros.episodes.pulse import Pulse
 from compass_ros.episodes.recovery import unfinished
+from compass_ros.episodes.rolling import Past, Rolling
 from compass_ros.episodes.writer import BagWriter
 from compass_ros.errors import BagError
 
+__all__ = ["LOCK_FILE", "Connection", "Recorder"]
+
 LOCK_FILE = ".recorder.lock"
-
-
-@dataclass(frozen=True)
-class Connection:
-    """A topic that is received, with the type that it has now."""
-
-    topic: str
-    definition: Definition
-    qos: str = ""
-    """The publishers' QoS profiles as a YAML list."""
-    latched: int = 0
-    """Publishers seen so far that keep their last messages for whoever comes later; 0: the topic is not latched."""
 
 
 @cache
@@ -49,6 +41,8 @@ class _Losses:
     """What an episode did not get; by topic."""
 
     lost: dict[str, int] = field(default_factory=dict)
+    heard: set[str] = field(default_factory=set)
+    """Topics that have had a message: what is missing before the first was sent before the episode, or was not."""
     retyped: list[str] = field(default_factory=list)
 
 
@@ -58,8 +52,12 @@ class Recorder:
     Times are the caller's [ns]. A write that fails ends the episode: its bag stays without an end and can be recovered.
     """
 
-    def __init__(self, folder: Path, min_free_bytes: int = 0, max_duration_ns: int = 0) -> None:
+    def __init__(
+        self, folder: Path, min_free_bytes: int = 0, max_duration_ns: int = 0, rolling: Rolling | None = None
+    ) -> None:
         """Make the folder and take hold of it. `max_duration_ns`: an episode without an end is ended; 0: never.
+
+        `rolling` keeps the last seconds, whether an episode runs or not.
 
         Raises BagError: the folder cannot be written, or another recorder holds it.
         """
@@ -67,6 +65,7 @@ class Recorder:
         """Bags are announced by paths in it, so they mean the same to whoever hears of them."""
         self._min_free_bytes = min_free_bytes
         self._max_duration_ns = max_duration_ns
+        self._rolling = rolling
         self._lock = _hold(self.folder)
         self._connections: dict[str, Connection] = {}
         self._latched: dict[str, Latched] = {}
@@ -93,6 +92,8 @@ class Recorder:
         """A topic can be received now, has changed its type, or is latched by more publishers."""
         before = self._connections.get(connection.topic, connection)
         self._connections[connection.topic] = connection
+        if self._rolling is not None:
+            self._rolling.connect(connection)
         self._sequences.pop(connection.topic, None)
         changed = before.definition != connection.definition
         if changed or not connection.latched:
@@ -110,13 +111,10 @@ class Recorder:
         """
         if self._writer is not None:
             raise BagError(f"episode {self.status.episode} is being recorded; stop or discard it first")
-        free = self.free_bytes()
-        name = episode_name(name) if name else next_name(path.name for path in self.folder.glob("*"))
-        if free < self._min_free_bytes:
-            raise BagError(f"{self.folder}: {free / 1e6:.0f} MB left; expected {self._min_free_bytes / 1e6:.0f} MB")
+        name = episode_name(name) if name else self._next("episode")
+        self._check_space()
         writer = BagWriter(self.folder / name)
         self._writer, self._losses, self._start_ns = writer, _Losses(), now_ns
-        self._sequences.clear()
         self._pulse = Pulse()
         self.status = EpisodeHeader("recording", name, cell, cell_hash, now_ns, bag=str(writer.folder))
         for connection in (_headers(), *self._connections.values()):
@@ -133,7 +131,7 @@ class Recorder:
         return self.progress()
 
     def take(self, topic: str, data: bytes, log_ns: int, publish_ns: int, sequence: int | None = None) -> None:
-        """One message of a connected topic; between episodes only latched ones matter, to the next.
+        """One message of a connected topic; between episodes it is kept for a while, or where it is latched.
 
         Args:
             sequence: The publisher's count of its messages, where the topic has one publisher: gaps are lost messages.
@@ -144,15 +142,26 @@ class Recorder:
         connection = self._connections[topic]
         if connection.latched:
             self._latched.setdefault(topic, Latched()).keep(publish_ns, data)
+        lost = self._missing(topic, sequence)
+        if self._rolling is not None:
+            self._rolling.keep(topic, log_ns, publish_ns, data, lost)
         if self._writer is None:
             return
-        if sequence is not None:
-            gap = sequence - self._sequences.get(topic, sequence - 1) - 1
-            if gap > 0:
-                self._losses.lost[topic] = self._losses.lost.get(topic, 0) + gap
-            self._sequences[topic] = sequence
+        if lost and topic in self._losses.heard:
+            self._losses.lost[topic] = self._losses.lost.get(topic, 0) + lost
+        self._losses.heard.add(topic)
         self._pulse.beat(topic, log_ns)
         self._write(connection, log_ns, publish_ns, data)
+
+    def last(self, now_ns: int) -> tuple[Path, Past]:
+        """What `rolling` has kept, and the folder of the bag that is to hold it, which is not there yet.
+
+        Raises BagError: nothing is kept, no space.
+        """
+        if self._rolling is None:
+            raise BagError("the recorder keeps nothing between episodes")
+        self._check_space()
+        return self.folder / self._next("last"), self._rolling.past(now_ns)
 
     def overdue(self, now_ns: int) -> bool:
         """Whether the episode has lasted longer than it may."""
@@ -226,6 +235,22 @@ class Recorder:
         steps = self._writer.clock_steps if self._writer is not None else 0
         stepped = [f"the clock stepped back {steps} time{'s' * (steps != 1)}"] if steps else []
         return (*lost, *self._losses.retyped, *stepped)
+
+    def _check_space(self) -> None:
+        free = self.free_bytes()
+        if free < self._min_free_bytes:
+            raise BagError(f"{self.folder}: {free / 1e6:.0f} MB left; expected {self._min_free_bytes / 1e6:.0f} MB")
+
+    def _next(self, stem: str) -> str:
+        return next_name((path.name for path in self.folder.glob("*")), stem)
+
+    def _missing(self, topic: str, sequence: int | None) -> int:
+        """How many messages are missing between the one before and this one, by their publisher's count."""
+        if sequence is None:
+            return 0
+        before = self._sequences.get(topic, sequence - 1)
+        self._sequences[topic] = sequence
+        return max(sequence - before - 1, 0)
 
     def _silent(self, end_ns: int) -> list[str]:
         return [f"{topic} stopped {s:.1f} s before the end" for topic, s in self._pulse.stopped(end_ns).items()]

@@ -226,7 +226,7 @@ def _copy(file: Path, writer: BagWriter) -> EpisodeHeader | None:
             elif isinstance(record, Message) and record.channel_id in channels:
                 channel, topic = channels[record.channel_id]
                 writer.write(channel, record.log_time, record.publish_time, record.data)
-                if topic.type in EPISODE_TYPES:
+                if topic.name == EPISODE_TOPIC and topic.type in EPISODE_TYPES:
                     with suppress(BagError):  # another version's message: kept as it is
                         last = header(decode(RawMessage(topic, record.log_time, record.data)))
     return last

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,18 +11,23 @@ from compass_ros_interfaces.msg import EpisodeInfo
 from compass_ros_interfaces.srv import StartEpisode, StopEpisode
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import IntegerRange
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.exceptions import NameValidationException
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_srvs.srv import Trigger
 
+from compass_ros.episodes.notes import EpisodeHeader
 from compass_ros.episodes.recording import Recorder
+from compass_ros.episodes.rolling import Rolling
 from compass_ros.episodes.writer import sync_bag
 from compass_ros.errors import BagError, shown
+from compass_ros.nodes.finished import Finished
 from compass_ros.nodes.managed import ManagedNode
 from compass_ros.nodes.qos import LATCHED
 from compass_ros.nodes.recorder_messages import episode_message, health_message
 from compass_ros.nodes.requests import checked_action, checked_text, one_line, wrong_text
 from compass_ros.nodes.run import ROS_ERRORS, run
+from compass_ros.nodes.topic_patterns import example, is_pattern, topic_pattern
 from compass_ros.nodes.topic_watch import TopicWatch
 
 DISCOVERY_PERIOD_S = 0.2
@@ -41,12 +46,14 @@ class RecorderNode(ManagedNode):
     def __init__(self) -> None:
         super().__init__("recorder")
         self._recorder: Recorder | None = None
+        self._rolling: Rolling | None = None
+        self._saving: Future[EpisodeHeader] | None = None
         self._declare()
 
     def _declare(self) -> None:
         declare = self.declare_fixed
-        topics = "names of the topics to record, of any type; relative ones are in the namespace and can be remapped, "
-        topics += "and the bag has them under the name that is given here, from the root"
+        topics = "topics to record, of any type: names, and patterns as /arm/* for what there is and what comes; "
+        topics += "relative ones are in the namespace (names can be remapped), and the bag has them from the root"
         declare("topics", DEFAULT_TOPICS, topics, self._wrong_topics)
         self.declare_data_dir()
         folder = "folder of the bags; this node holds it alone; empty: `episodes` in data_dir"
@@ -58,16 +65,21 @@ class RecorderNode(ManagedNode):
         whole("depth", 1000, "messages of a topic that wait here when the disk is slow [count]", 1, 1_000_000)
         whole("min_free_mb", 500, "an episode is not started with less on the disk [MB]", 0, 10**9)
         whole("max_duration_s", 600, "an episode that nobody stops is ended after this [s]; 0: never", 0, 10**8)
+        whole("buffer_s", 0, "the last seconds are kept in memory, for ~/save_last [s]; 0: nothing", 0, 86_400)
+        whole("buffer_mb", 256, "memory of that at most; while it is saved, twice as much [MB]", 1, 10**6)
         declare("cell", "", "name of the cell, where the start service does not say it", wrong_text)
         hashed = "hash of the cell's configuration, where the start service does not say it"
         declare("cell_hash", "", hashed, wrong_text)
 
     def configure(self) -> None:
         """Raises BagError: the folder cannot be written, or another recorder holds it."""
+        span_s, most_mb = self._whole("buffer_s"), self._whole("buffer_mb")
+        self._rolling = Rolling(span_s * 10**9, most_mb * 10**6) if span_s else None
         self._recorder = Recorder(
             self.place("directory", "episodes"),
             min_free_bytes=self._whole("min_free_mb") * 10**6,
             max_duration_ns=self._whole("max_duration_s") * 10**9,
+            rolling=self._rolling,
         )
         self._syncing = ThreadPoolExecutor(1)  # the disk may take its time; the answer to `stop` may not
         self._status_topic = self.create_publisher(EpisodeInfo, "~/status", LATCHED)
@@ -75,9 +87,13 @@ class RecorderNode(ManagedNode):
         self.create_service(StartEpisode, "~/start_episode", self._on_start)
         self.create_service(StopEpisode, "~/stop_episode", self._on_stop)
         self.create_service(Trigger, "~/discard_episode", self._on_discard)
+        beside = MutuallyExclusiveCallbackGroup()  # what comes in the meantime is taken
+        self.create_service(Trigger, "~/save_last", self._on_save_last, callback_group=beside)
+        given: list[str] = self.get_parameter("topics").value
         self._watch = TopicWatch(
             self,
-            {self.resolve_topic_name(topic): _recorded(topic) for topic in self.get_parameter("topics").value},
+            {self.resolve_topic_name(topic): _recorded(topic) for topic in given if not is_pattern(topic)},
+            [topic_pattern(topic, self.get_namespace()) for topic in given if is_pattern(topic)],
             depth=self._whole("depth"),
             connected=self._recorder.connect,
             received=self._on_message,
@@ -89,12 +105,15 @@ class RecorderNode(ManagedNode):
             self.get_logger().warning(self._recorder.status.message)
 
     def deactivate(self) -> None:
-        """Raises BagError while an episode runs."""
+        """Raises BagError while an episode runs, or is saved."""
+        if self._saving is not None and not self._saving.done():
+            raise BagError("the last seconds are being saved; wait for the answer")
         if self._running.recording:
             raise BagError(f"episode {self._running.status.episode} is being recorded; stop or discard it first")
 
     def problems(self) -> list[str]:
-        return [*super().problems(), *(self._watch.problems() if self.active else ()), *self._scarcity()]
+        watched = self._watch.problems() if self.active else ()
+        return [*super().problems(), *watched, *self._scarcity(), *self._short()]
 
     def tell(self) -> None:
         if self._recorder is not None:
@@ -131,12 +150,21 @@ class RecorderNode(ManagedNode):
             return [str(error)]
         return [f"{free} MB left on the disk, {asked} MB are asked for"] if free < asked else []
 
+    def _short(self) -> list[str]:
+        """What is wrong with the last seconds."""
+        if self._rolling is None or not self._rolling.short:
+            return []
+        covered, wanted = self._rolling.covered_ns * 1e-9, self._whole("buffer_s")
+        return [f"only the last {covered:.1f} s of {wanted} fit into buffer_mb: {self._whole('buffer_mb')}"]
+
     def _wrong_topics(self, topics: Sequence[str]) -> str:
         if not topics:
             return "expected one topic or more, found none"
         for topic in topics:
+            if is_pattern(topic) and topic.startswith("~"):
+                return f"{shown(topic)} is no pattern of topics: expected one from the root, or in the namespace"
             try:
-                validate_full_topic_name(self.resolve_topic_name(topic))
+                validate_full_topic_name(self.resolve_topic_name(example(topic)))
             except (NameValidationException, *ROS_ERRORS) as error:
                 return f"{shown(topic)} is no name of a topic: {one_line(str(error).split(', at ')[0])}"
         return ""
@@ -192,6 +220,20 @@ class RecorderNode(ManagedNode):
             response.message = str(error)
         return response
 
+    async def _on_save_last(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        del request  # empty
+        try:
+            folder, past = self._running.last(self._now_ns())
+            self._saving = self._syncing.submit(past.write, folder, self._text("cell"), self._text("cell_hash"))
+            saved = await Finished(self._saving)
+            self._syncing.submit(sync_bag, folder)
+            what = f"the last {saved.duration_ns * 1e-9:.1f} s, {saved.messages} messages"
+            response.success, response.message = True, "; ".join(filter(None, [f"{saved.bag}: {what}", saved.message]))
+            self.get_logger().info(response.message)
+        except BagError as error:
+            response.message = str(error)
+        return response
+
     def _on_tick(self) -> None:
         if self._running.overdue(self._now_ns()):
             try:
@@ -215,6 +257,8 @@ class RecorderNode(ManagedNode):
             "lost messages": self._running.lost,
             **self._running.counts(),
         }
+        if self._rolling is not None:
+            values["kept for save_last [s]"] = round(self._rolling.covered_ns * 1e-9, 1)
         self._received = 0
         with suppress(BagError):  # `problems` has said so
             values["free on disk [MB]"] = self._running.free_bytes() // 10**6

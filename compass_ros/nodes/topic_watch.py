@@ -1,4 +1,4 @@
-"""Follows topics by name: finds their types and QoS, receives them raw, notices when a type changes."""
+"""Follows topics by name or pattern: finds types and QoS, receives them raw, notices when a type or the QoS changes."""
 
 from __future__ import annotations
 
@@ -9,18 +9,26 @@ from importlib import import_module
 
 import yaml
 from rclpy.duration import Duration
+from rclpy.exceptions import NoTypeSupportImportedException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
+from rclpy.type_support import check_for_type_support
 
+from compass_ros.episodes.connection import Connection
 from compass_ros.episodes.definitions import Definition, installed_definition
+from compass_ros.episodes.notes import EPISODE_TOPIC, NOTES_TOPIC, SHOT_TOPIC
 from compass_ros.episodes.pulse import Pulse
-from compass_ros.episodes.recording import Connection
 from compass_ros.errors import BagError
+from compass_ros.nodes.topic_patterns import TopicPattern
 
 Received = Callable[[str, bytes, int, int | None], None]
 """Takes topic, bytes, publish time [ns], and the publisher's count of messages (None with several publishers)."""
+
+
+_WRITTEN = frozenset({EPISODE_TOPIC, SHOT_TOPIC, NOTES_TOPIC})
+"""What the recorder writes itself: of an episode that is played back, a pattern does not take it into another one."""
 
 
 class TopicWatch:
@@ -30,29 +38,35 @@ class TopicWatch:
         self,
         node: Node,
         topics: Mapping[str, str],
+        patterns: Sequence[TopicPattern],
         depth: int,
         connected: Callable[[Connection], None],
         received: Received,
     ) -> None:
-        """`topics`: where messages are received -> the name under which they are handed on.
+        """`topics`: where messages are received -> the name under which they are handed on. `patterns`: of others, from
+        their first publisher on.
 
         `connected` is called when a topic is found and when its type changes, before its first message, and when a
         latched topic gets another publisher."""
         self._node = node
         self._topics = dict(topics)
+        self._patterns = patterns
         self._depth = depth
         self._connected = connected
         self._received = received
         self._subscriptions: dict[str, Subscription] = {}
+        self._profiles: dict[str, QoSProfile] = {}
+        """Of the subscriptions."""
         self._connections: dict[str, Connection] = {}
         self._publishers: dict[str, int] = {}
-        self._latching: dict[str, set[tuple[int, ...]]] = {}
-        """The publishers seen so far on each topic that is latched."""
+        self._heard: dict[str, set[tuple[int, ...]]] = {}
+        """The publishers that each subscription has had so far."""
         self._problems: dict[str, str] = {}
         self._pulse = Pulse()
 
     def update(self) -> None:
         """Look at the graph: subscribe to what is new, again to what has changed."""
+        self._find()
         for topic in self._topics:
             publishers = self._node.get_publishers_info_by_topic(topic)
             self._publishers[topic] = len(publishers)
@@ -78,7 +92,11 @@ class TopicWatch:
         if len(types) > 1:
             self._problems[topic] = f"{topic} is published with {len(types)} types: {', '.join(sorted(types))}"
         if now is not None and now.definition.type in types:
-            if self._latches(topic, publishers) > now.latched:
+            offered = [publisher for publisher in publishers if publisher.topic_type == now.definition.type]
+            if self._unsuited(topic, offered):
+                self._node.destroy_subscription(self._subscriptions.pop(topic))
+                self._subscribe(topic, now.definition, offered)
+            elif self._latches(topic, publishers) > now.latched:
                 self._connect(topic, now.definition, publishers)
             return
         if topic in self._subscriptions:  # one participant holds one type of a topic, until the executor lets go of it
@@ -86,11 +104,32 @@ class TopicWatch:
             return  # received again from the next look on
         kind = min(types)
         offered = [publisher for publisher in publishers if publisher.topic_type == kind]
-        definition, message_class = _definition(kind, offered), _class(kind)
-        profile = matching_qos(offered, self._depth)
-        self._latching.pop(topic, None)
-        if profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
-            self._latching[topic] = set()
+        self._subscribe(topic, _definition(kind, offered), offered)
+
+    def _find(self) -> None:
+        """Topics that fit a pattern and have come; a pattern that none fits is a problem."""
+        if not self._patterns:
+            return
+        there = [topic for topic, _ in self._node.get_topic_names_and_types()]
+        for pattern in self._patterns:
+            fitting = [topic for topic in there if pattern.matches(topic) and topic not in _WRITTEN]
+            for topic in fitting:
+                if topic not in self._topics and self._published_by_others(topic):
+                    self._topics[topic] = pattern.recorded(topic)
+            if self._topics.keys().isdisjoint(fitting):
+                self._problems[pattern.text] = f"no topic matches {pattern.text}"
+            else:
+                self._problems.pop(pattern.text, None)
+
+    def _published_by_others(self, topic: str) -> bool:
+        own = (self._node.get_name(), self._node.get_namespace())
+        publishers = self._node.get_publishers_info_by_topic(topic)
+        return any((publisher.node_name, publisher.node_namespace) != own for publisher in publishers)
+
+    def _subscribe(self, topic: str, definition: Definition, offered: Sequence[TopicEndpointInfo]) -> None:
+        message_class = _class(definition.type)
+        profile = self._profiles[topic] = matching_qos(offered, self._depth)
+        self._heard[topic] = set()
         self._connect(topic, definition, offered)
         receive = partial(self._receive, topic)
         self._subscriptions[topic] = self._node.create_subscription(message_class, topic, receive, profile, raw=True)
@@ -102,11 +141,21 @@ class TopicWatch:
 
     def _latches(self, topic: str, publishers: Sequence[TopicEndpointInfo]) -> int:
         """How many publishers a latched topic has had, with these; 0 for one that is not latched."""
-        seen = self._latching.get(topic)
-        if seen is None:
-            return 0
-        seen.update(tuple(publisher.endpoint_gid) for publisher in publishers)
-        return len(seen)
+        heard = self._heard[topic]
+        heard.update(_identities(publishers))
+        return len(heard) if self._profiles[topic].durability == DurabilityPolicy.TRANSIENT_LOCAL else 0
+
+    def _unsuited(self, topic: str, publishers: Sequence[TopicEndpointInfo]) -> bool:
+        """Whether a subscription misses what the publishers that are there now say.
+
+        A reliable one gets nothing from a publisher that is not, a latched one nothing from one that is not. Only a
+        latched one gets what was said before it came; what it has heard already would come again.
+        """
+        now, wanted = self._profiles[topic], matching_qos(publishers, self._depth)
+        deaf = now.reliability == ReliabilityPolicy.RELIABLE != wanted.reliability
+        latched = [one.durability == DurabilityPolicy.TRANSIENT_LOCAL for one in (now, wanted)]
+        late = latched == [False, True] and self._heard[topic].isdisjoint(_identities(publishers))
+        return deaf or latched == [True, False] or late
 
     def _receive(self, topic: str, data: bytes, info: Mapping[str, int | None]) -> None:
         self._pulse.beat(topic, time.monotonic_ns())
@@ -125,6 +174,10 @@ def matching_qos(publishers: Sequence[TopicEndpointInfo], depth: int) -> QoSProf
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )
+
+
+def _identities(publishers: Sequence[TopicEndpointInfo]) -> set[tuple[int, ...]]:
+    return {tuple(publisher.endpoint_gid) for publisher in publishers}
 
 
 def qos_yaml(publishers: Sequence[TopicEndpointInfo]) -> str:
@@ -160,9 +213,11 @@ def _definition(kind: str, publishers: Sequence[TopicEndpointInfo]) -> Definitio
 
 
 def _class(kind: str) -> type:
-    """The message class of `package/msg/Name`. Raises BagError where its Python module is not installed."""
+    """The message class of `package/msg/Name`. Raises BagError where its package is not installed, or not whole."""
     package, _, name = kind.split("/")
     try:
-        return getattr(import_module(f"{package}.msg"), name)  # type: ignore[no-any-return]
-    except (ImportError, AttributeError) as error:
-        raise BagError(f"the Python module of {kind} is not installed: {error}") from error
+        found: type = getattr(import_module(f"{package}.msg"), name)
+        check_for_type_support(found)
+    except (ImportError, AttributeError, NoTypeSupportImportedException) as error:
+        raise BagError(f"the package {package} of {kind} is not installed with its Python part: {error}") from error
+    return found

@@ -22,7 +22,15 @@ from compass_ros.episodes.definitions import (
     embedded_definition,
     typestore,
 )
-from compass_ros.episodes.notes import NOTES_TOPIC, EpisodeHeader, Shot, encoded, header_bytes, shot_bytes
+from compass_ros.episodes.notes import (
+    EPISODE_TOPIC,
+    NOTES_TOPIC,
+    EpisodeHeader,
+    Shot,
+    encoded,
+    header_bytes,
+    shot_bytes,
+)
 from compass_ros.episodes.writer import BagWriter
 from compass_ros.errors import BagError
 from test.episodes.planted import ALL, PUCK1, PUCKS, START_NS, episode, mcap_file, pose_bag, pose_bytes
@@ -210,7 +218,7 @@ def test_the_shot_of_an_earlier_episode_is_left_out(tmp_path: Path) -> None:
     head = header_bytes(EpisodeHeader("finished", "e", start_ns=START_NS))
     old, new = fired(START_NS - 5 * 10**9, v=1), fired(START_NS + MS, v=2)
     bag = with_messages(
-        tmp_path / "b", ("/e", EPISODE_TYPE, head), ("/a/shot", SHOT_TYPE, old), ("/a/shot", SHOT_TYPE, new)
+        tmp_path / "b", (EPISODE_TOPIC, EPISODE_TYPE, head), ("/a/shot", SHOT_TYPE, old), ("/a/shot", SHOT_TYPE, new)
     )
     found = read_episode(bag, PUCK1)
     assert found.action == {"v": 2}
@@ -222,7 +230,7 @@ def test_the_shot_of_an_earlier_episode_is_left_out(tmp_path: Path) -> None:
 def test_bags_of_every_version_say_their_shot_and_their_episode(tmp_path: Path, head_type: str, shot_type: str) -> None:
     """Version 0.1 called the interface package otherwise."""
     head = header_bytes(EpisodeHeader("finished", "seventh", "air_hockey", "abc", START_NS))
-    bag = with_messages(tmp_path / "b", ("/e", head_type, head), ("/a/shot", shot_type, fired(START_NS, v=2)))
+    bag = with_messages(tmp_path / "b", (EPISODE_TOPIC, head_type, head), ("/a/shot", shot_type, fired(START_NS, v=2)))
     found = read_bag(bag, PUCK1)
     assert (found.episode.name, found.episode.cell_hash, found.episode.action) == ("seventh", "abc", {"v": 2})
     assert {topic.type for topic in found.topics if topic.known} >= {head_type, shot_type}

@@ -26,6 +26,7 @@ from rosbags.rosbag2 import StoragePlugin
 from compass_ros.episodes import recover, reindex, write_episode
 from compass_ros.episodes.definitions import POSE_TYPE, STRING_TYPE, embedded_definition
 from compass_ros.episodes.recording import Connection, Recorder
+from compass_ros.episodes.rolling import Rolling
 from test.episodes.foreign import write_rosbag2
 from test.episodes.planted import PUCK1, START_NS, episode, mcap_file, pose_bytes
 from test.episodes.test_latched import text
@@ -54,8 +55,11 @@ def digest(data: bytes) -> str:
 
 
 def recorded(folder: Path, stop: bool) -> tuple[Path, list[Found]]:
-    """A recording of several chunks; its bag, and what was sent. A latched message came before it."""
-    recorder = Recorder(folder)
+    """A recording of several chunks; its bag, and what was sent. A latched message came before it.
+
+    Its last 2 s are in the bag `last_0001` beside it.
+    """
+    recorder = Recorder(folder, rolling=Rolling(2 * 10**9, 10**9))
     for topic, kind, latched in (
         ("/robot_description", STRING_TYPE, 1),
         (PUCK1[0].topic, POSE_TYPE, 0),
@@ -74,6 +78,8 @@ def recorded(folder: Path, stop: bool) -> tuple[Path, list[Found]]:
             sent.append(("/large", at_ns, text(random.bytes(75_000).hex())))
     for topic, at_ns, data in sent[1:]:
         recorder.take(topic, data, at_ns, at_ns - 1)
+    last, past = recorder.last(sent[-1][1])
+    past.write(last, "cell", "a1")
     if stop:
         recorder.stop()
     recorder.close()
@@ -98,6 +104,7 @@ def bags(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     reindex(reindexed)
     return {
         "finished": recorded(folder / "finished", stop=True)[0],
+        "saved afterwards": folder / "finished" / "last_0001",
         "recovered": killed,
         "recovered in a chunk": cut_in_a_chunk(recorded(folder / "cut", stop=True)[0]),
         "imported": write_episode(episode(), folder),
