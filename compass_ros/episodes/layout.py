@@ -27,6 +27,9 @@ _NUMBERS = {
 }  # fmt: skip
 _DEEPEST = 32
 """Messages in messages; those of ROS have six at most, and a definition that holds itself has no end."""
+_EXCESS = 8
+"""Bytes behind a message for each empty array of numbers of eight bytes: `rclpy.serialization.serialize_message` gives
+the size that it had reserved, in which such an array begins at a multiple of eight, and what follows with it."""
 _STEPS = 8
 """Fields that a byte may stand for: a message that says more (arrays of nothing) is not walked to its end."""
 
@@ -97,7 +100,7 @@ def layout(fields: Fields, type_name: str, data: bytes, ros1: bool = False) -> L
     except _MisfitError as error:
         raise BagError(f"a message is not a {type_name}: {error}") from error
     left = len(data) - walk.at
-    if not 0 <= left <= (0 if ros1 else 3):  # CDR may be filled up to a multiple of four
+    if not 0 <= left <= (0 if ros1 else 3 + _EXCESS * walk.empty):  # CDR may be filled up to a multiple of four
         raise BagError(f"a message is not a {type_name}: {left} of its {len(data)} bytes are left over")
     fixed = np.concatenate([np.arange(0 if ros1 else 2), *(np.arange(a, b) for a, b in walk.fixed)]).astype(np.int64)
     return Layout(walk.places, walk.texts, walk.sizes, fixed)
@@ -118,6 +121,8 @@ class _Walk:
     texts: dict[str, str] = field(default_factory=dict)
     sizes: dict[str, int] = field(default_factory=dict)
     fixed: list[tuple[int, int]] = field(default_factory=list)
+    empty: int = 0
+    """Arrays without numbers, of eight bytes each."""
 
     def __post_init__(self) -> None:
         self.start = 0 if self.ros1 else 4
@@ -168,6 +173,8 @@ class _Walk:
         dtype = np.dtype(self.order + _NUMBERS[base])
         if count:
             self._align(dtype.itemsize)
+        elif dtype.itemsize == 8:
+            self.empty += 1
         self.places[path] = Place(self.at, dtype, count)
         self._skip(count * dtype.itemsize)
 

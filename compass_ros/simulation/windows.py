@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from compass_ros.cells import Cell
 from compass_ros.cells.drives import Drive
+from compass_ros.cells.series import InputSpec
 from compass_ros.cells.signals import Signal
 from compass_ros.cells.start import state_names
 from compass_ros.errors import DataError
@@ -44,7 +45,7 @@ def windows(cell: Cell, episodes: Sequence[Episode]) -> list[Episode]:
         return list(episodes)
     out: list[Episode] = []
     for episode in episodes:
-        own = list(_cut(cell, episode, spec.length_s))
+        own = list(_cut(cell, _without_gaps(cell, episode), spec.length_s))
         moving = [window for window in own if _moves(cell, window)]
         if not moving:
             raise DataError(f"{episode.source or episode.name}: nothing moves in its {len(own)} windows")
@@ -76,18 +77,23 @@ def usable(cell: Cell, recordings: Sequence[Episode]) -> tuple[list[Episode], tu
 
 def drive(cell: Cell, episode: Episode) -> Drive:
     """The recorded inputs of an episode, on its own clock. Raises DataError where one is missing."""
+    tracks = _without_gaps(cell, episode).inputs
+    return Drive(tuple((t.stamp_ns - episode.start_ns) * _NS for t in tracks), tuple(t.value for t in tracks))
+
+
+def _without_gaps(cell: Cell, episode: Episode) -> Episode:
+    """With the inputs of the cell alone, in its order, without gaps. Raises DataError where one is missing."""
     known = {track.object: track for track in episode.inputs}
-    time_s, value = [], []
+    own = []
     for spec in cell.spec.inputs:
         track = known.get(spec.name)
         if track is None or not len(track.stamp_ns):
             raise DataError(f"{episode.source or episode.name}: no input '{spec.name}' in it; it has {sorted(known)}")
-        time_s.append((track.stamp_ns - episode.start_ns) * _NS)
-        value.append(_without_gaps(track))
-    return Drive(tuple(time_s), tuple(value))
+        own.append(track if not np.isnan(track.value).any() else replace(track, value=_held(track)))
+    return replace(episode, inputs=tuple(own))
 
 
-def _without_gaps(track: Track) -> Floats:
+def _held(track: Track) -> Floats:
     """(F, D) each number holding its last value where a message lacked it; before the first one, the first."""
     rows = np.arange(len(track.value))
     out = np.empty_like(track.value)
@@ -124,15 +130,32 @@ def _window(cell: Cell, episode: Episode, start_ns: int, end_ns: int) -> Episode
     first = {name: first_state(signal, around[name], around, cell, start_ns) for name, signal in signals.items()}
     rate = cell.spec.windows.rate_hz if cell.spec.windows else math.inf
     tracks = tuple(_thinned(_between(t, start_ns, end_ns), rate) for t in episode.tracks)
+    named = {spec.name: spec for spec in cell.spec.inputs}
     return replace(
         episode,
         name=f"{episode.name} at {(start_ns - episode.start_ns) * _NS:.1f} s",
         recording=episode.name,
         start_ns=start_ns,
         tracks=tracks,
+        inputs=tuple(_driving(cell, named[t.object], t, start_ns) for t in episode.inputs),
         initial_state={name: tuple(state.tolist()) for name, (state, _) in first.items()},
         initial_std={name: tuple(std.tolist()) for name, (_, std) in first.items()},
     )
+
+
+def _driving(cell: Cell, spec: InputSpec, track: Track, start_ns: int) -> Track:
+    """What an input says from a window's start to its end, as early and as late as its delay may be.
+
+    With all of a long recording in each of its windows, time and memory would grow with the square of its length.
+    """
+    delays = np.atleast_1d(np.asarray(spec.delay_s, float)).tolist()
+    for p, one in zip(cell.parameters, cell.spec.parameters, strict=False):
+        if one.field.partition("[")[0] == "input_delay_s" and one.of == spec.name:
+            delays += [p.low, p.high]
+    begin_ns = start_ns - math.ceil(max(delays) / _NS)
+    end_ns = start_ns + math.ceil((cell.duration - min(delays)) / _NS)
+    first = max(int(np.searchsorted(track.stamp_ns, begin_ns, side="right")) - 1, 0)
+    return _chosen(track, slice(first, int(np.searchsorted(track.stamp_ns, end_ns)) + 1))
 
 
 def _thinned(track: Track, rate_hz: float) -> Track:
@@ -181,9 +204,9 @@ def first_state(
 
 def _fit(track: Track, start_ns: int, sigma: float, columns: list[int]) -> tuple[Floats, Floats]:
     """(2, D) value and rate at a moment of some columns together, and their standard deviations."""
-    near = _near(track, start_ns, columns)
-    time = (track.stamp_ns[near] - start_ns) * _NS
-    return _polynomial(time, track.value[near][:, columns], sigma)
+    own = near(track, start_ns, columns)
+    time = (track.stamp_ns[own] - start_ns) * _NS
+    return _polynomial(time, track.value[own][:, columns], sigma)
 
 
 def _polynomial(time: Floats, value: Floats, sigma: float) -> tuple[Floats, Floats]:
@@ -197,8 +220,8 @@ def _polynomial(time: Floats, value: Floats, sigma: float) -> tuple[Floats, Floa
 
 
 def _first_pose(track: Track, start_ns: int, sigma: float) -> tuple[Floats, Floats]:
-    near = _near(track, start_ns, list(range(7)))
-    time, value = (track.stamp_ns[near] - start_ns) * _NS, track.value[near]
+    own = near(track, start_ns, list(range(7)))
+    time, value = (track.stamp_ns[own] - start_ns) * _NS, track.value[own]
     rotations = Rotation.from_quat(value[:, [4, 5, 6, 3]])
     middle = rotations[int(np.argmin(np.abs(time)))]
     (place, velocity), (place_std, velocity_std) = _polynomial(time, value[:, :3], sigma)
@@ -208,15 +231,27 @@ def _first_pose(track: Track, start_ns: int, sigma: float) -> tuple[Floats, Floa
     return state, np.concatenate([place_std, np.zeros(4), velocity_std, rate_std, turn_std])
 
 
-def _near(track: Track, start_ns: int, columns: list[int]) -> Ints:
+def near(track: Track, start_ns: int, columns: list[int]) -> Ints:
     """Frames around a moment: within AROUND_S of it, at least FEWEST and at most MOST of them."""
-    away = np.abs(track.stamp_ns - start_ns)
-    seen = np.flatnonzero(~np.isnan(track.value[:, columns]).any(axis=1))
+    seen = _seen_around(track, int(np.searchsorted(track.stamp_ns, start_ns)), columns)
     if not len(seen):
         raise DataError(f"signal '{track.object}': its number {columns[0] + 1} is in no message")
-    order = seen[np.argsort(away[seen], kind="stable")]
-    count = int(np.clip(np.sum(away[seen] <= AROUND_S / _NS), FEWEST, MOST))
+    away = np.abs(track.stamp_ns[seen] - start_ns)
+    order = seen[np.argsort(away, kind="stable")]
+    count = int(np.clip(np.sum(away <= AROUND_S / _NS), FEWEST, MOST))
     return np.sort(order[:count])
+
+
+def _seen_around(track: Track, middle: int, columns: list[int]) -> Ints:
+    """Frames in which some columns were seen: MOST before a frame and MOST from it on, or all that there are."""
+    reach, frames = MOST, len(track.stamp_ns)
+    while True:
+        first, last = max(middle - reach, 0), min(middle + reach, frames)
+        seen = first + np.flatnonzero(~np.isnan(track.value[first:last, columns]).any(axis=1))
+        before = int(np.sum(seen < middle))
+        if (first == 0 or before >= MOST) and (last == frames or len(seen) - before >= MOST):
+            return seen
+        reach *= 2
 
 
 def _measured_rates(signal: Signal, tracks: dict[str, Track], cell: Cell, start_ns: int) -> tuple[Floats, Floats]:
@@ -228,8 +263,8 @@ def _measured_rates(signal: Signal, tracks: dict[str, Track], cell: Cell, start_
         for i, joint in enumerate(signal.at):
             if joint in other.at:
                 column = other.at.index(joint)
-                near = _near(tracks[other.name], start_ns, [column])
-                rates[i], std[i] = np.mean(tracks[other.name].value[near, column]), other.noise
+                own = near(tracks[other.name], start_ns, [column])
+                rates[i], std[i] = np.mean(tracks[other.name].value[own, column]), other.noise
     return rates, std
 
 

@@ -17,9 +17,9 @@ from compass_ros.pipeline import calibrate
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.manifold import apart, charted, on_manifold
 from compass_ros.simulation.replay import recordings
-from compass_ros.simulation.windows import usable, windows
+from compass_ros.simulation.windows import FEWEST, MOST, near, usable, windows
 from compass_ros.types import Episode, Floats, Track
-from test.series.arms import CELL, START_NS, episode, recorded, write_cell
+from test.series.arms import CELL, PARAMETERS, START_NS, command, episode, recorded, write_cell
 
 
 def smooth(seconds: float, rate_hz: float, noise: float, seed: int = 0) -> tuple[Floats, Floats, Floats]:
@@ -92,6 +92,59 @@ def test_a_recording_without_motion_or_too_short_is_one_line(tmp_path: Path) -> 
         windows(cell, [episode("run", time, still, still)])
     with pytest.raises(DataError, match=r"expected at least 1 s"):
         windows(cell, [episode("run", time[:40], still[:40], still[:40])])
+
+
+DRIVEN = {
+    # the YAML of the input, bounds of the elbow's delay, at which it is simulated, share of numbers that are not said
+    "held": ("hold: zero", (0, 0.2), 0.0, 0.0),
+    "at the longest delay": ("hold: zero", (0, 0.2), 0.2, 0.0),
+    "ahead": ("hold: zero", (-0.3, 0.0), -0.3, 0.0),
+    "linear": ("hold: linear", (0, 0.2), 0.13, 0.0),
+    "one late by itself": ("hold: linear, delay_s: [0.4, 0.0]", (-0.1, 0.1), 0.05, 0.0),
+    "rarely said": ("hold: zero", (0, 0.2), 0.1, 0.98),
+}
+
+
+@pytest.mark.parametrize("name", DRIVEN)
+def test_a_window_has_what_drives_it_and_no_more(tmp_path: Path, name: str) -> None:
+    """Simulated as with all of a recording's inputs, which alone would grow with the square of its length."""
+    given, bounds, delay, lacking = DRIVEN[name]
+    text = (CELL + PARAMETERS).replace("of: [shoulder, elbow]}", f"of: [shoulder, elbow], {given}}}", 1)
+    cell = load(
+        write_cell(tmp_path, text.replace("default: 0.0, bounds: [0, 0.2]", f"default: 0.0, bounds: {[*bounds]}"))
+    )
+    time, target = command(40.0, 4, 200.0)
+    target[np.random.default_rng(1).random(target.shape) < lacking] = np.nan
+    whole = episode("run", time, target, smooth(40.0, 200.0, 0.001)[1])
+    found = windows(cell, [whole])
+    most = (cell.duration + bounds[1] - bounds[0] + 0.4) * 200 + 3
+    assert max(len(w.inputs[0].stamp_ns) for w in found) <= most
+    of_all = [replace(w, inputs=whole.inputs) for w in found]
+    seen = []
+    for own in (found, of_all):
+        data = recordings(cell, own)
+        simulator = Simulator(cell, threads=1).driven(data.drives)
+        values = np.tile(cell.values({"elbow@actuation@delay": delay}), (len(own), 1))
+        seen.append(simulator.observe(values, simulator.inputs(data.inputs), data.time_s))
+    np.testing.assert_allclose(seen[0], seen[1], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "lacking"), [(30, 0.0), (1000, 0.0), (1000, 0.9), (4000, 0.5), (50, 0.8), (5000, 0.999)]
+)
+def test_a_first_state_is_of_the_frames_around_it_in_however_long_a_recording(rate_hz: float, lacking: float) -> None:
+    """As all frames of the recording say it."""
+    rng = np.random.default_rng(int(rate_hz))
+    stamps = START_NS + np.sort(rng.choice(10 * 10**9, round(10 * rate_hz), replace=False))
+    value = rng.normal(size=(len(stamps), 2))
+    value[rng.random(value.shape) < lacking] = np.nan
+    track = Track("joints", "joint_position", stamps, value)
+    for start_ns in (stamps[0], stamps[-1] + 10**9, *rng.choice(stamps, 5), START_NS + 10**9):
+        seen = np.flatnonzero(~np.isnan(value[:, 1]))
+        away = np.abs(stamps[seen] - start_ns)
+        count = int(np.clip(np.sum(away <= 0.05 * 1e9), FEWEST, MOST))
+        nearest = np.sort(seen[np.argsort(away, kind="stable")[:count]])
+        assert near(track, int(start_ns), [1]).tolist() == nearest.tolist()
 
 
 @pytest.mark.parametrize("lacks", ["motion", "length", "target", "one angle", "one target", "everything"])
