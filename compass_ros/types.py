@@ -240,6 +240,18 @@ class Together:
 
 
 @dataclass(frozen=True)
+class Told:
+    """What recordings tell of parameters, by name; each is in one of the four, or in several groups."""
+
+    alone: tuple[str, ...]
+    """Pinned down, whatever is thought of the others."""
+    together: tuple[Together, ...]
+    weakly: tuple[str, ...]
+    """Narrower than before only by what is known of others, or by little."""
+    not_at_all: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Iteration:
     """State of a calibration after one iteration, for figures."""
 

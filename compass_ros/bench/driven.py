@@ -11,17 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from compass_ros.cells import Cell
-from compass_ros.cells.drives import Drive
-from compass_ros.cells.series import InputSpec
 from compass_ros.errors import ConfigError
 from compass_ros.simulation import Simulator
-from compass_ros.types import Episode, Floats, Track
-
-FIRST_NS = 1_700_000_000_000_000_000
-_BETWEEN_NS = 10**11
-"""From the start of one recording to that of the next."""
-_SETTLED_S = 2.0
-"""How long the first target was held before a recording begins."""
+from compass_ros.simulation.driven import driven_joints, virtual_recordings
+from compass_ros.types import Episode, Floats
 
 
 @dataclass(frozen=True)
@@ -69,53 +62,12 @@ def record(cell: Cell, truth: Floats, count: int, routine: Routine, seed: int, t
 
     Raises ConfigError for a cell that is not driven by joint positions alone.
     """
-    spec = _position_input(cell)
     simulator = Simulator(cell, threads=threads)
-    limits = simulator.limits(spec.targets)
+    driven = driven_joints(simulator)
+    if driven.spec.quantity != "joint_position":
+        raise ConfigError(f"{cell.path}: inputs: the virtual controller sends joint positions, nothing else")
+    limits = simulator.limits(driven.spec.targets)
     tables = [excitation(limits, routine, 1000 * seed + i) for i in range(count)]
-    simulator = simulator.driven([Drive((_held(time),), (_first_held(target),)) for time, target in tables])
-    inputs = np.zeros((count, len(cell.input_names)))
-    first = [name.rpartition(".")[0].rpartition(".")[2] for name in cell.input_names]
-    for i, (_, target) in enumerate(tables):
-        inputs[i, -1] = i
-        for column, name in enumerate(cell.input_names):
-            if name.endswith(".angle") and first[column] in spec.of:
-                inputs[i, column] = target[0, spec.of.index(first[column])]
-    seen_at = np.stack([_SETTLED_S + time for time, _ in tables])
-    seen = simulator.observe(np.tile(truth, (count, 1)), simulator.inputs(inputs), seen_at)
+    series = np.stack([target for _, target in tables])
     rng = np.random.default_rng([seed, 13])
-    return [_episode(cell, i, tables[i], _measured(cell, seen[i], rng)) for i in range(count)]
-
-
-def _position_input(cell: Cell) -> InputSpec:
-    inputs = cell.spec.inputs
-    if len(inputs) != 1 or inputs[0].quantity != "joint_position" or inputs[0].to != "ctrl":
-        raise ConfigError(
-            f"{cell.path}: inputs: the virtual controller sends joint positions to actuators, nothing else"
-        )
-    return inputs[0]
-
-
-def _held(time: Floats) -> Floats:
-    return np.concatenate([[0.0], _SETTLED_S + time])
-
-
-def _first_held(target: Floats) -> Floats:
-    return np.concatenate([target[:1], target])
-
-
-def _measured(cell: Cell, seen: Floats, rng: np.random.Generator) -> Floats:
-    """(F, C) what the sensors say: white noise, then whole steps."""
-    out = seen.copy()
-    for signal in cell.signals:
-        noisy = out[:, signal.columns] + (signal.noise or 0.0) * rng.normal(size=(len(seen), signal.size))
-        out[:, signal.columns] = signal.step * np.round(noisy / signal.step) if signal.step else noisy
-    return out
-
-
-def _episode(cell: Cell, index: int, table: tuple[Floats, Floats], measured: Floats) -> Episode:
-    start = FIRST_NS + index * _BETWEEN_NS
-    stamps = start + np.round(table[0] * 1e9).astype(np.int64)
-    tracks = tuple(Track(s.name, s.quantity, stamps, measured[:, s.columns]) for s in cell.signals)
-    target = Track(cell.spec.inputs[0].name, "joint_position", stamps, table[1])
-    return Episode(f"motion_{index:02d}", cell.name, cell.hash, {}, start, tracks, inputs=(target,))
+    return virtual_recordings(simulator, driven, truth, tables[0][0], series, series[:, 0], rng)

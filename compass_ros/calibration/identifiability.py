@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from compass_ros.types import Bools, Floats, Ints, Parameter, Together
+from compass_ros.types import Bools, Floats, Ints, Parameter, Together, Told
 
 IDENTIFIED = 0.5
 """A parameter is identified where the recordings shrink its prior width at least to this share."""
@@ -30,6 +30,36 @@ _OF_LARGEST = 0.05
 """A direction that moves the parameters of a group by less, beside the largest, is another group's."""
 _ALIKE = 0.98
 """Cosine between relative changes along an open direction and equal ones, from which it is a common factor."""
+
+UNSEEN = 0.9
+"""Share of its prior width above which the recordings are said not to show a parameter at all."""
+
+
+def told(covariance: Floats, values: Floats, parameters: Sequence[Parameter]) -> Told:
+    """From the (p, p) covariance of all parameters at (p,) values."""
+    identified = alone(covariance) < IDENTIFIED
+    groups = together(covariance, identified, values, parameters)
+    grouped = {name for group in groups for name in group.parameters}
+    unseen = np.sqrt(np.diag(covariance)) > UNSEEN
+    rest = [(p.name, hidden) for p, known, hidden in zip(parameters, identified, unseen, strict=True) if not known]
+    return Told(
+        alone=tuple(p.name for p, known in zip(parameters, identified, strict=True) if known),
+        together=groups,
+        weakly=tuple(name for name, hidden in rest if name not in grouped and not hidden),
+        not_at_all=tuple(name for name, hidden in rest if name not in grouped and hidden),
+    )
+
+
+def information(changes: Floats, of_start: Floats) -> Floats:
+    """(E, n, n) products of the changes of E episodes by n numbers, without what their first states could do instead.
+
+    (E, m, n) changes of m measurements [sigma] by one prior width of each number; (E, m, l) by one standard deviation
+    of what is free in each episode. Schur complement, the prior of the first states included, that of the n not.
+    """
+    both = changes.transpose(0, 2, 1)
+    cross = of_start.transpose(0, 2, 1) @ changes
+    inner = of_start.transpose(0, 2, 1) @ of_start + np.eye(of_start.shape[2])
+    return np.asarray(both @ changes - cross.transpose(0, 2, 1) @ np.linalg.solve(inner, cross))
 
 
 def alone(covariance: Floats, coupled: Floats | float = 1.0) -> Floats:

@@ -12,6 +12,7 @@ from itertools import product
 
 import numpy as np
 
+from compass_ros.calibration.identifiability import information as information_of
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.screen import Space
 from compass_ros.discovery.tangents import differences
@@ -143,8 +144,4 @@ def _grams(space: Space, tangents: Floats) -> Floats:
     weight = space.weight[:, :, None]
     base = space.fit.linear.jacobian.reshape(episodes, size, -1) * weight
     own = space.fit.linear.launch_jacobian.reshape(episodes, size, -1) * weight
-    both = np.concatenate([base, tangents.reshape(episodes, size, -1)], axis=2)
-    gram = both.transpose(0, 2, 1) @ both
-    cross = own.transpose(0, 2, 1) @ both
-    inner = own.transpose(0, 2, 1) @ own + np.eye(own.shape[2])
-    return np.asarray(gram - cross.transpose(0, 2, 1) @ np.linalg.solve(inner, cross))
+    return information_of(np.concatenate([base, tangents.reshape(episodes, size, -1)], axis=2), own)

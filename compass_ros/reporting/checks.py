@@ -13,6 +13,7 @@ from compass_ros.reporting.words import (
     VERDICT_TITLE,
     Level,
     best_model,
+    by_kind,
     fit_rmse,
     held_out_rmse,
     told,
@@ -59,6 +60,7 @@ def assess(result: Result) -> tuple[Check, ...]:
         *_carries_over(result),
         *_identifiable(result),
         *_together(result),
+        *_not_seen(result),
         *_at_bounds(result),
         *_verdict(result),
         *_effects_predict(result),
@@ -147,6 +149,14 @@ def _together(result: Result) -> Iterator[Check]:
     for group in result.together:
         text = f"{group.sentence}. Keep one of them at a value that was measured, and the others follow."
         yield Check("care", f"{len(group.parameters)} parameters told only together", text)
+
+
+def _not_seen(result: Result) -> Iterator[Check]:
+    grouped = {name for group in result.together for name in group.parameters}
+    hidden = [r.name for r in result.parameters if not (r.active or r.identifiable or r.name in grouped)]
+    if hidden:
+        text = f"{by_kind(hidden)}: hardly anything in these recordings depends on it. Values are as before."
+        yield Check("note", f"{len(hidden)} parameters not seen", text)
 
 
 def _at_bounds(result: Result) -> Iterator[Check]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from compass_ros.reporting.numbers import MINUS, with_unit
-from compass_ros.types import ParameterRow, Phase, Result, Verdict, Where
+from compass_ros.types import ParameterRow, Phase, Result, Told, Verdict, Where
 
 Level = Literal["good", "note", "care", "bad"]
 Model = Literal["nominal", "calibrated", "with_effects"]
@@ -116,3 +116,24 @@ def where_rows(where: Where) -> tuple[tuple[str, str], ...]:
     if where.time_s is not None:
         rows.append(("time", f"{where.time_s[0]:.2f} to {where.time_s[1]:.2f} s after the command"))
     return tuple(rows)
+
+
+def by_kind(names: Sequence[str]) -> str:
+    """`damping of joint_1, joint_2; mass of link`, from parameters' names `object@type@param`."""
+    kinds: dict[str, list[str]] = {}
+    for name in names:
+        of, _, rest = name.partition("@")
+        kinds.setdefault(rest.rpartition("@")[2] or of, []).append(of)
+    return "; ".join(kind if of == [kind] else f"{kind} of {', '.join(of)}" for kind, of in kinds.items())
+
+
+def told_lines(told: Told) -> list[str]:
+    """What recordings tell of parameters, in words; a line for each way of which there are any."""
+    groups = ". ".join(group.sentence for group in told.together)
+    said = {
+        f"pinned down ({len(told.alone)})": by_kind(told.alone),
+        f"only together ({sum(len(g.parameters) for g in told.together)})": groups,
+        f"hardly ({len(told.weakly)})": by_kind(told.weakly),
+        f"not at all ({len(told.not_at_all)})": by_kind(told.not_at_all),
+    }
+    return [f"{how}: {names}" for how, names in said.items() if names]

@@ -258,6 +258,14 @@ class Simulator:
             observed[rows] = part
         return observed, same
 
+    def states(self, values: Floats, inputs: Floats, duration: float) -> tuple[Floats, Floats]:
+        """(B, T + 1, s) whole states (mjSTATE_FULLPHYSICS), the start first, and (B, T, n) what drives MuJoCo."""
+        steps = self._steps(duration)
+        start, controls = self.physics.start(values, inputs), self.physics.controls(values, inputs, steps)
+        states = self._player.play(self.physics, values, start, controls, steps)[0]
+        driven = np.empty((len(values), steps, 0)) if controls is None else controls
+        return np.concatenate([start[:, None], states], axis=1), driven
+
     def bodies(self, values: Floats, action: Floats, time_s: Floats) -> dict[str, Floats]:
         """(F, 3) x, y [m], yaw [rad] of each moving body of a planar cell as the camera sees it; for drawings."""
         duration = float(np.max(time_s))
