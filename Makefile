@@ -23,7 +23,7 @@ STAMPS := $(VENV)/.stamps
 export MUJOCO_GL ?= disable
 
 SHARED := $(shell find resource config launch -type f -o -type l)
-NATIVE := $(wildcard compass_ros/simulation/native/*.c)
+NATIVE := $(wildcard compass_ros/simulation/native/*.[ch])
 
 # Others' readers, to which the tests give our bags: Foxglove's, for Node, and Rerun's, whose numpy is not ours.
 READERS := test/readers

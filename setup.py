@@ -47,7 +47,7 @@ setup(
     packages=[*find_packages(include=[NAME, f"{NAME}.*"]), f"{NAME}.config.cells"],
     package_dir={f"{NAME}.config.cells": "config/cells"},
     package_data={
-        NAME: ["py.typed", "**/*.json", "**/*.j2", "**/*.css", "**/*.js", "**/*.c"],
+        NAME: ["py.typed", "**/*.json", "**/*.j2", "**/*.css", "**/*.js", "**/*.c", "**/*.h"],
         f"{NAME}.config.cells": ["*.yaml", "*.xml"],
     },
     ext_modules=native(),

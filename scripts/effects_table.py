@@ -9,9 +9,9 @@ import sys
 from pathlib import Path
 
 from compass_ros.reporting.markdown import replace_between
-from compass_ros.simulation.effects import EFFECTS, Quantity
-from compass_ros.simulation.sites import JOINTS, in_words
-from compass_ros.simulation.sizes import unit_joint
+from compass_ros.simulation.effects import EFFECTS, Effect, Quantity
+from compass_ros.simulation.extents import unit_sizes
+from compass_ros.simulation.sites import SIGNALS, SINGLE_DRIVES, SiteKind, in_words
 
 PAGE = Path(__file__).parents[1] / "docs" / "effects.md"
 BEGIN, END = "<!-- table: begin -->\n", "<!-- table: end -->\n"
@@ -30,15 +30,28 @@ def table() -> str:
         lines += [f"### {channel}", "", "| name | acts on | formula | parameters: bounds [unit] |", "|---|---|---|---|"]
         for name, effect in EFFECTS.items():
             if effect.channel == channel:
-                only_joints = set(effect.on) <= set(JOINTS)
-                parameters = [] if only_joints else [_described(q) for q in effect.quantities]
-                if effect.on_joint is not None:
-                    of_joint = [f"`{q.name}` [{q.unit}]" for q in effect.on_joint(unit_joint("hinge"))]
-                    parameters.append(f"on a hinge: {', '.join(of_joint)}")
+                sized = _sized(effect)
+                absolute = [] if set(effect.on) <= set(sized) else [_described(q) for q in effect.quantities]
+                parameters = absolute + list(dict.fromkeys(sized.values()))
                 row = (f"`{name}`", in_words(effect.on), formula(name).replace("|", "&#124;"), "<br>".join(parameters))
                 lines.append(f"| {' | '.join(row)} |")
         lines.append("")
     return "\n".join(lines)
+
+
+def _sized(effect: Effect) -> dict[SiteKind, str]:
+    """By kind of site, the quantities of an effect whose sizes follow from the cell."""
+    words = {"hinge": "on a hinge", "body": "on a body"}
+    out: dict[SiteKind, str] = {}
+    for kind in effect.on:
+        shown = "hinge" if kind == "slide" else kind
+        sizes = () if kind == "tool_drive" else unit_sizes(shown)
+        numbers = effect.at(sizes[0]).quantities if sizes else effect.quantities
+        if numbers is not effect.quantities:
+            of_command = kind in (*SINGLE_DRIVES, *SIGNALS)  # whose units the scene decides
+            units = ", ".join(f"`{q.name}`" + ("" if of_command else f" [{q.unit}]") for q in numbers)
+            out[kind] = f"{words.get(shown, 'as large as the cell has it')}: {units}"
+    return out
 
 
 def _described(quantity: Quantity) -> str:

@@ -14,6 +14,10 @@ from compass_ros.types import Floats
 ALIKE: tuple[tuple[SiteKind, ...], ...] = (PLANAR, *((kind,) for kind in JOINTS))
 """What moves in the same way: one number of an effect means the same for all of them."""
 
+BY_NAME_ALONE = frozenset({"load_dependent_friction", "cogging", "torque_saturation"})
+"""Laws that first order, as it is here, cannot rank: a load is no part of a path, a period is not found from four
+starts, and a limit does nothing before it is the largest force that was seen. They can be attached by name."""
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -42,6 +46,8 @@ def candidates(simulator: Simulator, values: Floats, inputs: Floats, time_s: Flo
     joints = simulator.joint_sizes(values, inputs, time_s)
     out: list[Attached] = []
     for effect in EFFECTS.values():
+        if effect.name in BY_NAME_ALONE:
+            continue
         if effect.moves:
             out.extend(_on_movers(effect, simulator, joints))
         elif effect.on_walls:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -12,6 +12,7 @@ import numpy as np
 from compass_ros.cells import Cell
 from compass_ros.cells.drives import Drive, Drives
 from compass_ros.cells.dynamics import Dynamics
+from compass_ros.cells.sensors import units_of
 from compass_ros.cells.signals import Signal
 from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.effect import Context, Sample, restore, table_friction
@@ -173,8 +174,7 @@ class Physics:
 
     def _of_signals(self, sites: tuple[Site, ...]) -> Bools:
         """(C,) which columns of an observation belong to some signals."""
-        kinds = {site.kind for site in sites}
-        return np.concatenate([np.full(s.size, signal_kind(s) in kinds) for s in self.cell.signals])
+        return np.isin(np.arange(len(self.cell.channels)), [c for site in sites for c in site.columns])
 
 
 def signal_kind(signal: Signal) -> SiteKind:
@@ -187,7 +187,19 @@ def signal_kind(signal: Signal) -> SiteKind:
 def places_of(cell: Cell, dynamics: Dynamics) -> Places:
     """The sites of a cell's scene."""
     sliding = frozenset(s.body for s in dynamics.sliding(cell.defaults[None]))
-    return Places(dynamics.model, sliding, tuple(dict.fromkeys(map(signal_kind, cell.signals))))
+    return Places(dynamics.model, sliding, tuple(_measured(cell, dynamics.model)))
+
+
+def _measured(cell: Cell, model: mujoco.MjModel) -> Iterator[Site]:
+    """Each signal of a cell, and each number of those that have several."""
+    for signal in cell.signals:
+        kind, units = signal_kind(signal), units_of(model, signal, str(cell.path))
+        columns = tuple(range(signal.first, signal.first + signal.size))
+        yield Site(kind, (signal.name,), columns=columns, quantity=signal.quantity, units=units)
+        for number, column, unit in zip(signal.numbers, columns, units, strict=True):
+            if len(columns) > 1:
+                name = f"{signal.name}.{number}"
+                yield Site(kind, (name,), columns=(column,), quantity=signal.quantity, units=(unit,))
 
 
 def _where(columns: Bools, sensed: Sample, before: Sample) -> Sample:

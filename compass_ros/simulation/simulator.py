@@ -18,11 +18,12 @@ from compass_ros.cells.signals import Signal
 from compass_ros.simulation.alike import roll_alike
 from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.effect import Effect
+from compass_ros.simulation.extents import BodySize, Path, body_size, paths, standing
 from compass_ros.simulation.native.program import evaluate, path_columns
 from compass_ros.simulation.physics import Physics, interpolate, places_of
 from compass_ros.simulation.player import Player
 from compass_ros.simulation.sites import JOINTS, Places, Site
-from compass_ros.simulation.sizes import DriveSize, JointSize, command_unit, joint_sizes
+from compass_ros.simulation.sizes import DriveSize, JointSize, command_unit, joint_sizes, largest_forces
 from compass_ros.types import Floats, Ints, Parameter, Unit
 
 CHUNK = 128
@@ -188,21 +189,43 @@ class Simulator:
         joints = {name: site for name, site in self.moving.items() if site.kind in JOINTS}
         if not joints:
             return {}
-        tiled = np.tile(values, (len(inputs), 1))
-        steps = self._steps(self.physics.duration(tiled, inputs, time_s))
-        start, controls = self.physics.start(tiled, inputs), self.physics.controls(tiled, inputs, steps)
-        states = self._player.play(self.physics, tiled, start, controls, steps)[0]
-        model, noise = self._player.written(self.physics, values[None])[0], self.cell.spec.noise_m
+        model, states, controls = self._visited(values, inputs, time_s)
+        noise = self.cell.spec.noise_m
         noises = {name: s.noise or noise for s in self.cell.signals if s.jointed and s.places for name in s.at}
         return joint_sizes(model, joints, states, (controls, self.physics.drives.parts), noises)
 
-    def drive_size(self, drives: Sequence[Site], values: Floats, inputs: Floats, time_s: Floats) -> DriveSize:
-        """What drives of one kind are told in (E, A) inputs up to (E, F) times [s], at (P,) values."""
+    def paths_in_space(
+        self, names: Sequence[str], values: Floats, inputs: Floats, time_s: Floats
+    ) -> tuple[dict[str, BodySize], dict[str, Path]]:
+        """How bodies move in (E, A) inputs up to (E, F) times [s], at (P,) values; what stands as what never moves."""
+        model, states, _ = self._visited(values, inputs, time_s)
+        found, seconds = paths(model, names, states), states.shape[1] * self.time_step
+        sites = {name: self.places.body(name) for name in names}
+        noise = self.cell.spec.noise_m
+        return {
+            name: body_size(model, site, found[name], seconds, noise) if site else standing(model)
+            for name, site in sites.items()
+        }, found
+
+    def drive_forces(self, values: Floats, inputs: Floats, time_s: Floats) -> Floats:
+        """(nu,) the largest force of each actuator in (E, A) inputs up to (E, F) times [s], at (P,) values."""
+        model, states, controls = self._visited(values, inputs, time_s)
+        return largest_forces(model, states, (controls, self.physics.drives.parts))
+
+    def drive_size(
+        self, drives: Sequence[Site], values: Floats, inputs: Floats, time_s: Floats, forces: Floats | None = None
+    ) -> DriveSize:
+        """What drives of one kind are told in (E, A) inputs up to (E, F) times [s], at (P,) values.
+
+        `forces`: (nu,) what the actuators exert there (`drive_forces`); without them that is taken for one.
+        """
         tiled = np.tile(values, (len(inputs), 1))
         plain = replace(self.physics, effects=())
-        controls = plain.controls(tiled, inputs, self._steps(plain.duration(tiled, inputs, time_s)))
+        steps = self._steps(plain.duration(tiled, inputs, time_s))
+        controls, unit = plain.controls(tiled, inputs, steps), command_unit(self.physics.model, drives[0])
         told = [np.linalg.norm(controls[:, :, list(d.actuators)], axis=2).max() for d in drives if controls is not None]
-        return DriveSize(drives[0].kind, float(max(told)), command_unit(self.physics.model, drives[0]))
+        force = 1.0 if forces is None else float(max(forces[i] for d in drives for i in d.actuators)) or 1.0
+        return DriveSize(drives[0].kind, float(max(told)), unit, force, steps * self.time_step)
 
     def forces(self, attached: Attached, numbers: Floats, values: Floats, states: Floats) -> dict[str, Floats]:
         """(B, F, 2) force of an effect on each mover in given states.
@@ -286,6 +309,14 @@ class Simulator:
         rows = interpolate(states, self.time_step, np.broadcast_to(time_s, (len(values), time_s.shape[-1])))
         rows = np.where(np.array(columns) >= 0, rows, 0.0).reshape(*rows.shape[:2], len(names), 4)
         return np.asarray(rows + np.array(rest))
+
+    def _visited(self, values: Floats, inputs: Floats, time_s: Floats) -> tuple[mujoco.MjModel, Floats, Floats | None]:
+        """The model at (P,) values, the (E, T, s) states of episodes and the (E, T, n) controls in them."""
+        tiled = np.tile(values, (len(inputs), 1))
+        steps = self._steps(self.physics.duration(tiled, inputs, time_s))
+        start, controls = self.physics.start(tiled, inputs), self.physics.controls(tiled, inputs, steps)
+        states = self._player.play(self.physics, tiled, start, controls, steps)[0]
+        return self._player.written(self.physics, values[None])[0], states, controls
 
     def _observe_together(
         self, values: Floats, inputs: Floats, time_s: Floats, like: Ints, until: Floats

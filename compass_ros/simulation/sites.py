@@ -25,6 +25,8 @@ SiteKind = Literal[
     "body",
     "wall",
     "contacts",
+    "geom_pair",
+    "body_pair",
     "tool_drive",
     "velocity_drive",
     "position_drive",
@@ -36,18 +38,21 @@ SiteKind = Literal[
 ]
 """hinge, slide: a joint with one degree of freedom. planar: a body that slides along x and y of the world (and may turn
 about z); lying: one that gravity presses on what it slides on; table: one whose friction there is the cell's. body: any
-other moving body. wall: a fixed geom in a pair. contacts: all of the scene. velocity_drive, position_drive,
+other moving body. wall: a fixed geom in a pair. contacts: all of the scene. geom_pair: two geoms that may touch;
+body_pair: two bodies of which one moves, or both. velocity_drive, position_drive,
 effort_drive, other_drive: an actuator by what it is told; tool_drive: velocity drives that move one tool along x and y
-of the world (and z), whose command is a vector. camera: all tracked bodies as they are seen; encoder: all that is
-measured of joints; sensor: all other signals."""
+of the world (and z), whose command is a vector. camera: tracked bodies as they are seen; encoder: what is measured of
+joints; sensor: other signals; each all of them, one by its name, or one of its numbers as `signal.number`."""
 
 JOINTS: tuple[SiteKind, ...] = ("hinge", "slide")
 LYING: tuple[SiteKind, ...] = ("table", "lying")
 PLANAR: tuple[SiteKind, ...] = (*LYING, "planar")
 MOVING: tuple[SiteKind, ...] = (*JOINTS, *PLANAR, "body")
 SPEED_DRIVES: tuple[SiteKind, ...] = ("tool_drive", "velocity_drive")
-DRIVES: tuple[SiteKind, ...] = (*SPEED_DRIVES, "position_drive", "effort_drive", "other_drive")
+SINGLE_DRIVES: tuple[SiteKind, ...] = ("velocity_drive", "position_drive", "effort_drive", "other_drive")
+DRIVES: tuple[SiteKind, ...] = ("tool_drive", *SINGLE_DRIVES)
 SIGNALS: tuple[SiteKind, ...] = ("camera", "encoder", "sensor")
+PAIRS: tuple[SiteKind, ...] = ("geom_pair", "body_pair")
 
 _WORDS: dict[SiteKind, str] = {
     "table": "body on the cell's table",
@@ -56,6 +61,8 @@ _WORDS: dict[SiteKind, str] = {
     "body": "moving body",
     "wall": "fixed geom in a contact pair",
     "contacts": "geoms that could touch",
+    "geom_pair": "two geoms",
+    "body_pair": "two bodies",
     "camera": "tracked body",
     "encoder": "measured joint",
     "sensor": "other sensor",
@@ -71,9 +78,15 @@ class Site:
 
     kind: SiteKind
     names: tuple[str, ...] = ()
-    """Of a joint, body or geom, or of a drive's actuators; empty for contacts and signals."""
+    """Of a joint, body, geom or signal, of a pair, or of a drive's actuators; empty for all contacts or signals."""
     actuators: tuple[int, ...] = ()
     """Of a drive: indices of its controls, in the order of the command's components."""
+    columns: tuple[int, ...] = ()
+    """Of what is measured: columns of an observation."""
+    quantity: str = ""
+    """Of one signal: what it measures."""
+    units: tuple[str, ...] = ()
+    """Of one signal: of each of its columns."""
 
     @property
     def name(self) -> str:
@@ -88,20 +101,25 @@ class Places:
     model: mujoco.MjModel
     sliding: frozenset[str] = frozenset()
     """Bodies whose friction on a table is the cell's, no part of the scene."""
-    signals: tuple[SiteKind, ...] = ()
-    """What is measured of it."""
+    signals: tuple[Site, ...] = ()
+    """What is measured of it: each signal, and each number of those that have several."""
 
     def sites(self, objects: Sequence[str], kinds: Collection[SiteKind]) -> tuple[Site, ...]:
         """Those of these kinds that the names stand for; without names all drives, all contacts or all signals."""
         if not objects:
-            whole = [*self.drives, *([Site("contacts")] if self.touching else []), *map(Site, self.signals)]
+            whole = [*self.drives, *([Site("contacts")] if self.touching else []), *self._measured]
             return tuple(site for site in whole if site.kind in kinds)
+        if paired := [kind for kind in PAIRS if kind in kinds]:
+            pairs = zip(objects[::2], objects[1::2], strict=False)
+            return tuple(site for one, other in pairs if (site := self.pair(paired[0], one, other)) is not None)
         found = [self.of(name, kinds) for name in objects]
         return self._joined(objects, kinds) or tuple(site for site in found if site is not None)
 
     def missing(self, objects: Sequence[str], kinds: Collection[SiteKind]) -> str:
         """Which of the names stands for no site of these kinds, and what there is, in one line; empty: none."""
         found, wanted = names_of(self.sites(objects, kinds)), in_words(kinds)
+        if any(kind in PAIRS for kind in kinds):
+            found, wanted = tuple(self._names(kinds)), "geom" if "geom_pair" in kinds else "body"
         if not objects:
             return "" if self.sites((), kinds) else f"the scene has no {wanted}"
         unknown = next((name for name in objects if name not in found), None)
@@ -131,9 +149,23 @@ class Places:
         """A fixed geom of that name that stands in a contact pair."""
         return Site("wall", (name,)) if name in self.walls else None
 
+    def signal(self, name: str) -> Site | None:
+        """What is measured under that name."""
+        return next((site for site in self.signals if site.name == name), None)
+
+    def pair(self, kind: SiteKind, one: str, other: str) -> Site | None:
+        """Two geoms of different bodies or two bodies, of which one moves."""
+        model, of_geoms = self.model, kind == "geom_pair"
+        what = mujoco.mjtObj.mjOBJ_GEOM if of_geoms else mujoco.mjtObj.mjOBJ_BODY
+        found = [mujoco.mj_name2id(model, what, name) for name in (one, other)]
+        if min(found) < 0:
+            return None
+        welded = model.body_weldid[model.geom_bodyid[found] if of_geoms else found]
+        return Site(kind, (one, other)) if welded[0] != welded[1] else None
+
     def of(self, name: str, kinds: Collection[SiteKind]) -> Site | None:
-        """The joint, body or wall of one of these kinds that has the name; a joint before a body called the same."""
-        found = (self.joint(name), self.body(name), self.wall(name))
+        """What of one of these kinds has the name; a joint before a body called the same."""
+        found = (self.joint(name), self.body(name), self.wall(name), self.signal(name))
         return next((site for site in found if site is not None and site.kind in kinds), None)
 
     def _joined(self, names: Sequence[str], kinds: Collection[SiteKind]) -> tuple[Site, ...]:
@@ -146,8 +178,17 @@ class Places:
         model = self.model
         joints = [self.joint(model.joint(i).name) for i in range(model.njnt)]
         bodies = [self.body(model.body(i).name) for i in range(1, model.nbody)]
-        found = [*joints, *bodies, *map(self.wall, self.walls), *self.drives]
-        return list(names_of(site for site in found if site is not None and site.kind in kinds))
+        found = [*joints, *bodies, *map(self.wall, self.walls), *self.drives, *self.signals]
+        named = list(names_of(site for site in found if site is not None and site.kind in kinds))
+        named += [model.geom(i).name for i in range(model.ngeom) if "geom_pair" in kinds]
+        return named + [model.body(i).name for i in range(model.nbody) if "body_pair" in kinds]
+
+    @cached_property
+    def _measured(self) -> tuple[Site, ...]:
+        """All that is measured, by kind."""
+        kinds = dict.fromkeys(site.kind for site in self.signals)
+        own = {kind: {c for site in self.signals if site.kind == kind for c in site.columns} for kind in kinds}
+        return tuple(Site(kind, columns=tuple(sorted(columns))) for kind, columns in own.items())
 
     @cached_property
     def walls(self) -> tuple[str, ...]:
@@ -231,6 +272,8 @@ def in_words(kinds: Collection[SiteKind]) -> str:
         return "joint or moving body"
     if set(kinds) >= set(DRIVES):
         return "drive"
+    if set(kinds) >= set(SINGLE_DRIVES):
+        return "drive of one actuator"
     wider = [k for k in kinds if not (k in LYING and "planar" in kinds) and not (k == "table" and "lying" in kinds)]
     return " or ".join(_WORDS.get(kind, kind.replace("_", " ")) for kind in wider)
 

@@ -6,7 +6,7 @@ joint are shares of its own force and speed, so that a scene in other units or o
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -69,6 +69,10 @@ class DriveSize:
     """Largest that it was told, by absolute value; the norm where a command has several components."""
     unit: str
     """Of that command; one of COMMAND_UNITS."""
+    force: float = 1.0
+    """Largest that one of its actuators exerted, by absolute value, in the actuator's unit."""
+    seconds: float = 1.0
+    """How long it was told something."""
 
 
 def joint_sizes(
@@ -86,11 +90,8 @@ def joint_sizes(
         driven: (E, T, n) what drives MuJoCo, and the mjtState bits that say what its rows are.
         noises: Of the position of each joint [rad, m].
     """
-    controls, parts = driven
-    at = np.unique(np.linspace(0, states.shape[1] - 1, SAMPLES).astype(int))
-    asked = [None if controls is None else controls[e, t] for e in range(len(states)) for t in at]
-    data, moments = mujoco.MjData(model), states[:, at].reshape(-1, states.shape[2])
-    rows = [_moment(model, data, state, told, parts) for state, told in zip(moments, asked, strict=True)]
+    data = mujoco.MjData(model)
+    rows = [_moment(model, data) for _ in _moments(model, data, states, driven)]
     inertia, position, speed, gravity, drive = np.stack(rows, axis=1)  # (M, nv) each
     seconds = states.shape[1] * float(model.opt.timestep)
     out = {}
@@ -106,12 +107,30 @@ def joint_sizes(
     return out
 
 
-def _moment(model: mujoco.MjModel, data: mujoco.MjData, state: Floats, told: Floats | None, parts: int) -> Floats:
-    """(5, nv) own inertia, position, speed, force of gravity and of what drives each degree of freedom in a state."""
-    mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-    if told is not None:
-        mujoco.mj_setState(model, data, told, parts)
-    mujoco.mj_forward(model, data)
+def largest_forces(model: mujoco.MjModel, states: Floats, driven: tuple[Floats | None, int]) -> Floats:
+    """(nu,) the largest force of each actuator, by absolute value, in the moments of `joint_sizes`."""
+    data = mujoco.MjData(model)
+    rows = [data.actuator_force.copy() for _ in _moments(model, data, states, driven)]
+    return np.asarray(np.abs(rows).max(axis=0))
+
+
+def _moments(
+    model: mujoco.MjModel, data: mujoco.MjData, states: Floats, driven: tuple[Floats | None, int]
+) -> Iterator[None]:
+    """Brings `data` into SAMPLES moments of each episode, one after the other."""
+    controls, parts = driven
+    at = np.unique(np.linspace(0, states.shape[1] - 1, SAMPLES).astype(int))
+    for episode in range(len(states)):
+        for t in at:
+            mujoco.mj_setState(model, data, states[episode, t], mujoco.mjtState.mjSTATE_FULLPHYSICS)
+            if controls is not None:
+                mujoco.mj_setState(model, data, controls[episode, t], parts)
+            mujoco.mj_forward(model, data)
+            yield
+
+
+def _moment(model: mujoco.MjModel, data: mujoco.MjData) -> Floats:
+    """(5, nv) own inertia, position, speed, force of gravity and of what drives each degree of freedom."""
     position = np.zeros(model.nv)
     for joint in range(model.njnt):
         if model.jnt_type[joint] in ONE_DOF:

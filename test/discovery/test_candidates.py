@@ -16,6 +16,7 @@ from compass_ros.types import Floats
 from test.cells.written import content, written
 from test.simulation.robots import robot, shots
 from test.simulation.table import cell as table
+from test.simulation.table import on_table
 from test.simulation.table import simulator as table_simulator
 
 ON_JOINTS = ["viscous_drag", "quadratic_drag", "stribeck_friction", "coulomb_friction", "spring"]
@@ -100,22 +101,25 @@ def test_laws_on_drives_are_asked_of_all_of_a_kind_and_of_each(
 
 
 def test_every_candidate_runs_and_those_that_push_do(arm: tuple[Cell, tuple[str, ...], tuple[str, ...]]) -> None:
-    """At its start nothing changes; at half of its range all is finite, and a force or a drive is felt."""
+    """At its start nothing changes; at half of its range all is finite, and a force or a drive is felt.
+
+    In a shot or in its opposite: some laws act in one direction.
+    """
     cell, _, _ = arm
-    simulator, inputs = Simulator(cell, threads=1), shots(cell, 1)
-    time = np.linspace(0, 0.4, 15)[None]
-    plain = simulator.observe(simulator.defaults[None], inputs, time)
+    simulator, inputs = Simulator(cell, threads=1), shots(cell, 1) * np.array([[1.0], [-1.0]])
+    time = np.tile(np.linspace(0, 0.4, 15), (2, 1))
+    plain = simulator.observe(np.tile(simulator.defaults, (2, 1)), inputs, time)
     for candidate in asked(simulator, inputs):
         quantities = candidate.attached.effect.quantities
         there = np.array([2 * q.scale if q.amplitude else q.start for q in quantities])
         absent = np.array([0.0 if q.amplitude else q.start for q in quantities])
         wider = simulator.with_effects([candidate.attached])
-        values = np.vstack([np.append(simulator.defaults, numbers) for numbers in (absent, there)])
-        seen = wider.observe(values, np.repeat(inputs, 2, axis=0), np.repeat(time, 2, axis=0))
-        assert (seen[0] == plain[0]).all(), candidate
+        values = np.repeat([np.append(simulator.defaults, numbers) for numbers in (absent, there)], 2, axis=0)
+        seen = wider.observe(values, np.tile(inputs, (2, 1)), np.tile(time, (2, 1)))
+        assert (seen[:2] == plain).all(), candidate
         assert np.isfinite(seen).all(), candidate
         if candidate.by_force or candidate.attached.effect.channel in ("actuation", "sensing"):
-            moved = np.abs(seen[1] - plain[0]).max()
+            moved = np.abs(seen[2:] - plain).max()
             assert moved > 0, candidate
 
 
@@ -125,7 +129,7 @@ def test_on_the_table_every_law_is_asked_as_ever(name: str) -> None:
     pucks = [("puck1", "puck2"), ("puck1",), ("puck2",)]
     walls = [("front_wall",), ("back_wall",), ("left_wall",), ("right_wall",), ("obstacle",)]
     kind = EFFECTS[name]
-    absent = name in ("spring", "latency", "stroke_jitter")
+    absent = kind.scattered or not on_table(kind)
     assert found == ([] if absent else pucks if kind.moves else walls if kind.on_walls else [()])
 
 

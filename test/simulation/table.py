@@ -16,6 +16,14 @@ DESCRIBED = np.array([-0.225, 0.075, 0.0, 0.45])
 WIDE = np.array([[-0.123, 0.094, 0.09, 0.75], [-0.252, -0.063, -0.15, 0.546], [-0.168, 0.097, -0.164, 0.661]])
 """Three shots within the arm's reach that together feel all 64 parameters."""
 
+KINDS = {"table", "lying", "planar", "wall", "contacts", "tool_drive", "camera"}
+"""The kinds of site that it has."""
+
+
+def on_table(kind: Effect) -> bool:
+    """Whether an effect can act on it without a name."""
+    return bool(KINDS & set(kind.on)) and not kind.by_name
+
 
 @cache
 def cell() -> Cell:

@@ -9,7 +9,7 @@ import pytest
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.effects import EFFECTS, Attached, effect
 from compass_ros.simulation.sites import DRIVES, JOINTS, MOVING, PLANAR, Places, Site, SiteKind, in_words
-from test.simulation.table import attached, simulator
+from test.simulation.table import attached, on_table, simulator
 
 EFFORT: tuple[SiteKind, ...] = ("effort_drive",)
 CONTACTS: tuple[SiteKind, ...] = ("contacts",)
@@ -178,7 +178,7 @@ def test_a_law_says_what_it_acts_on_and_is_refused_elsewhere_with_what_there_is(
     with pytest.raises(ConfigError, match=f"'{name}'.*'nobody'") as refused:
         Attached(kind, wrong).sites(simulator().places)
     assert "\n" not in str(refused.value)
-    assert simulator().accepts(kind, attached(kind).objects) is (name not in ("spring", "latency"))
+    assert simulator().accepts(kind, attached(kind).objects) is on_table(kind)
 
 
 def test_a_sized_law_acts_on_its_own_kind_alone() -> None:

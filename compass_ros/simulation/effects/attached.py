@@ -8,7 +8,7 @@ import numpy as np
 
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.effects.effect import Effect
-from compass_ros.simulation.sites import Places, Site
+from compass_ros.simulation.sites import Places, Site, in_words
 from compass_ros.types import Bools, Floats, Parameter
 
 
@@ -40,17 +40,26 @@ class Attached:
 
     def objection(self, places: Places) -> str:
         """Why it cannot act in a scene, in one line; empty where it can."""
-        kind = self.effect
-        if kind.moves and not self.objects:
-            return f"effect '{kind.name}' acts on at least one object, found none"
-        if kind.on_walls and len(self.objects) != 1:
-            return f"effect '{kind.name}' acts on one wall, found {list(self.objects)}"
+        kind, sites = self.effect, places.sites(self.objects, self.effect.on)
+        if miscounted := self._miscounted():
+            return f"effect '{kind.name}' acts {miscounted}, found {list(self.objects) or 'none'}"
         if missing := places.missing(self.objects, kind.on):
             return f"effect '{kind.name}': {missing}"
-        for site in places.sites(self.objects, kind.on):
+        if kind.paired and 2 * len(sites) < len(self.objects):
+            return f"effect '{kind.name}' cannot act between {list(self.objects)}: neither moves against the other"
+        for site in sites:
             if kind.unable is not None and (why := kind.unable(places.model, site)):
-                return f"effect '{kind.name}' cannot act on '{site.name}': {why}"
+                return f"effect '{kind.name}' cannot act on '{'+'.join(site.names)}': {why}"
         return ""
+
+    def _miscounted(self) -> str:
+        """On how many objects it acts, where these are too few or too many."""
+        kind, count = self.effect, len(self.objects)
+        if (kind.moves or kind.by_name) and not count:
+            return "on at least one object"
+        if kind.paired and (not count or count % 2):
+            return f"between {in_words(kind.on)}"
+        return "on one wall" if kind.on_walls and count != 1 else ""
 
     def sites(self, places: Places) -> tuple[Site, ...]:
         """What the objects are in a scene. Raises ConfigError where the effect cannot act on one of them there."""

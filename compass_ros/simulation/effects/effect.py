@@ -11,8 +11,9 @@ import numpy as np
 
 from compass_ros.cells.dynamics import Sliding
 from compass_ros.errors import ConfigError
+from compass_ros.simulation.extents import BodySize, PairSize, SignalSize, Size
 from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.simulation.sites import JOINTS, MOVING, Places, Site, SiteKind
+from compass_ros.simulation.sites import JOINTS, MOVING, PAIRS, Places, Site, SiteKind
 from compass_ros.simulation.sizes import DriveSize, JointSize
 from compass_ros.types import Channel, Floats
 
@@ -88,6 +89,14 @@ class Effect:
     """Its quantities on a joint, from how that moves and what moves it; None: it acts on no joint."""
     on_drive: Callable[[DriveSize], tuple[Quantity, ...]] | None = None
     """Its quantities on a drive that moves no tool along x and y, from what that is told; None: `quantities`."""
+    on_body: Callable[[BodySize], tuple[Quantity, ...]] | None = None
+    """Its quantities on a body in space, from how that moves; None: `quantities`."""
+    on_pair: Callable[[PairSize], tuple[Quantity, ...]] | None = None
+    """Its quantities between two geoms or bodies; None: it acts on no pair."""
+    on_signal: Callable[[SignalSize], tuple[Quantity, ...]] | None = None
+    """Its quantities on one signal, from what that shows; None: `quantities`."""
+    by_name: bool = False
+    """Whether it acts on what is named alone, and means nothing for all of a kind."""
     unable: Callable[[mujoco.MjModel, Site], str] | None = None
     """Why it cannot act on a site of the right kind, where its kind does not say all; empty: it can. None: it can."""
 
@@ -95,6 +104,11 @@ class Effect:
     def moves(self) -> bool:
         """Whether it acts on bodies or joints by name."""
         return any(kind in MOVING for kind in self.on)
+
+    @property
+    def paired(self) -> bool:
+        """Whether it acts between two geoms or bodies."""
+        return any(kind in PAIRS for kind in self.on)
 
     @property
     def on_walls(self) -> bool:
@@ -109,14 +123,23 @@ class Effect:
         """The same on some of its kinds of site alone."""
         return replace(self, on=kinds)
 
-    def at(self, size: JointSize | DriveSize) -> Effect:
-        """The same with the quantities that it has on such a joint or drive, and on its kind alone."""
-        quantities = self.quantities
-        if isinstance(size, JointSize) and self.on_joint is not None:
-            quantities = self.on_joint(size)
-        if isinstance(size, DriveSize) and self.on_drive is not None:
-            quantities = self.on_drive(size)
-        return replace(self, on=(size.kind,), quantities=quantities)
+    def at(self, size: Size) -> Effect:
+        """The same with the quantities that it has on a site of that size, and on its kind alone."""
+        return replace(self, on=(size.kind,), quantities=self._sized(size) or self.quantities)
+
+    def _sized(self, size: Size) -> tuple[Quantity, ...]:
+        """Empty: they do not depend on the size."""
+        match size:
+            case JointSize():
+                return self.on_joint(size) if self.on_joint else ()
+            case DriveSize():
+                return self.on_drive(size) if self.on_drive else ()
+            case BodySize():
+                return self.on_body(size) if self.on_body else ()
+            case PairSize():
+                return self.on_pair(size) if self.on_pair else ()
+            case SignalSize():
+                return self.on_signal(size) if self.on_signal else ()
 
 
 RESTORED = (
@@ -124,8 +147,12 @@ RESTORED = (
     "geom_quat",
     "geom_sameframe",
     "geom_solref",
+    "actuator_forcelimited",
+    "actuator_forcerange",
     "body_inertia",
     "body_ipos",
+    "body_iquat",
+    "body_mass",
     "body_sameframe",
     "pair_solref",
 )

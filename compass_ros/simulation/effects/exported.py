@@ -17,8 +17,8 @@ from compass_ros.errors import ConfigError, shown
 from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.effect import Effect
 from compass_ros.simulation.effects.registry import effect
-from compass_ros.simulation.sites import JOINTS, SiteKind
-from compass_ros.simulation.sizes import COMMAND_UNITS, DriveSize, unit_joint
+from compass_ros.simulation.extents import unit_sizes
+from compass_ros.simulation.sites import SiteKind
 
 _strict = ConfigDict(extra="forbid", allow_inf_nan=False)
 
@@ -89,12 +89,13 @@ def write_effects(effects: Sequence[FittedEffect], sliding: Mapping[str, Sliding
 
 def _entry(fitted: FittedEffect) -> _Entry:
     kind = fitted.attached.effect
+    known = effect(kind.name)
     rows = zip(kind.quantities, fitted.values, fitted.std, strict=True)
     return _Entry(
         name=kind.name,
         objects=fitted.attached.objects,
         values={q.name: _Value(value=v, unit=q.unit, std=s if np.isfinite(s) else None) for q, v, s in rows},
-        on=kind.on[0] if len(kind.on) == 1 and kind.on != effect(kind.name).on else None,
+        on=kind.on[0] if len(kind.on) == 1 and (kind.on != known.on or _units(kind) != _units(known)) else None,
     )
 
 
@@ -115,7 +116,7 @@ def read_effects(path: Path | str) -> Exported:
 
 def _fitted(entry: _Entry, path: Path | str) -> FittedEffect:
     found = {name: value.unit for name, value in entry.values.items()}
-    variants = [(kind, {q.name: q.unit for q in kind.quantities}) for kind in _variants(entry, path)]
+    variants = [(kind, _units(kind)) for kind in _variants(entry, path)]
     kind, expected = next((v for v in variants if v[1] == found), variants[0])
     if found != expected:
         raise ConfigError(f"{path}: {entry.name}: expected values with units {expected}, found {shown(found)}")
@@ -131,6 +132,8 @@ def _variants(entry: _Entry, path: Path | str) -> list[Effect]:
         return [kind]
     if entry.on not in kind.on:
         raise ConfigError(f"{path}: {entry.name}: on: expected one of {', '.join(kind.on)}, found '{entry.on}'")
-    if entry.on in JOINTS:
-        return [kind.at(unit_joint(entry.on))]
-    return [kind.at(DriveSize(entry.on, 1.0, unit)) for unit in COMMAND_UNITS]
+    return [kind.at(size) for size in unit_sizes(entry.on)] or [kind.on_kinds((entry.on,))]
+
+
+def _units(kind: Effect) -> dict[str, str]:
+    return {q.name: q.unit for q in kind.quantities}

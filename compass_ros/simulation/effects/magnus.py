@@ -1,14 +1,17 @@
 """A push across the motion, as on a spinning body.
 
-F = m rate (-v_y, v_x), for a spin that stays the same over an episode.
+F = m rate (-v_y, v_x), for a spin that stays the same over an episode; on a body in space F = m coefficient w x v, w
+its own spin.
 Source: Magnus force, proportional to spin times speed (Kutta-Joukowski); `rate` holds spin and air density.
 """
 
 from __future__ import annotations
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.simulation.extents import BodySize
 from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.simulation.sites import PLANAR
+from compass_ros.simulation.sizes import LARGEST, MODEST
 from compass_ros.types import Floats
 
 
@@ -16,11 +19,17 @@ def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
     return tuple(Term(Kind.MAGNUS, site, numbers) for site in context.sites)
 
 
+def _on_body(size: BodySize) -> tuple[Quantity, ...]:
+    most = size.acceleration / (size.spin * size.speed)
+    return (Quantity("coefficient", "1", -LARGEST * most, LARGEST * most, MODEST * most),)
+
+
 EFFECT = Effect(
     name="magnus",
     channel="dynamics",
     quantities=(Quantity("rate", "1/s", -2.0, 2.0, 0.05),),
     sentence="a push across the motion (Magnus force)",
-    on=PLANAR,
+    on=(*PLANAR, "body"),
     forces=_forces,
+    on_body=_on_body,
 )

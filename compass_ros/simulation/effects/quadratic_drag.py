@@ -7,6 +7,7 @@ Source: drag equation, coefficient = density C_d area / (2 m).
 from __future__ import annotations
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.simulation.extents import BodySize
 from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.simulation.sites import MOVING
 from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize
@@ -22,6 +23,11 @@ def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
     return (Quantity("coefficient", size.unit(" s^2/L^2"), 0.0, LARGEST * most, MODEST * most),)
 
 
+def _on_body(size: BodySize) -> tuple[Quantity, ...]:
+    most = size.acceleration / size.speed**2
+    return (Quantity("coefficient", "1/m", 0.0, LARGEST * most, MODEST * most),)
+
+
 EFFECT = Effect(
     name="quadratic_drag",
     channel="dynamics",
@@ -30,4 +36,5 @@ EFFECT = Effect(
     on=MOVING,
     forces=_forces,
     on_joint=_on_joint,
+    on_body=_on_body,
 )

@@ -7,6 +7,7 @@ Source: Stokes drag and viscous shear of an air cushion, of grease in a bearing;
 from __future__ import annotations
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.simulation.extents import BodySize
 from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.simulation.sites import MOVING
 from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize
@@ -22,6 +23,11 @@ def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
     return (Quantity("rate", size.unit(" s/L"), 0.0, LARGEST * most, MODEST * most),)
 
 
+def _on_body(size: BodySize) -> tuple[Quantity, ...]:
+    most = size.acceleration / size.speed
+    return (Quantity("rate", "1/s", 0.0, LARGEST * most, MODEST * most),)
+
+
 EFFECT = Effect(
     name="viscous_drag",
     channel="dynamics",
@@ -30,4 +36,5 @@ EFFECT = Effect(
     on=MOVING,
     forces=_forces,
     on_joint=_on_joint,
+    on_body=_on_body,
 )

@@ -19,15 +19,17 @@ enum Kind {
   TABLE_FRICTION = 1, UNIFORM = 2, VISCOUS = 3, QUADRATIC = 4, CROSSWIND = 5, FAN = 6, SWIRL = 7, ATTRACTION = 8,
   FRICTION_PATCH = 9, FRICTION_GRADIENT = 10, ANISOTROPIC = 11, STRIBECK = 12, COULOMB = 13, MAGNUS = 14, PULSATING = 15,
   RATE_RESTITUTION = 16, TANGENTIAL = 17, LIBRARY = 18, HAT = 19, TILT = 20, SPRING = 21,
+  ASYMMETRIC = 22, LOAD_FRICTION = 23, COGGING = 24, GRAVITY_TILT = 25, WIND = 26, BUOYANCY = 27, SERVO_DEAD_BAND = 28,
+  ADHESION = 29, ROLLING = 30, PAIR_ATTRACTION = 31, TETHER = 32,
 };
 
 // What the object is, and so where its forces go: a body that slides along x and y, the same with a hinge about z after
-// them, any other moving body, a joint of its own.
-enum Object { PLANAR = 0, BODY = 1, JOINT = 2, PLANAR_YAW = 3 };
+// them, any other moving body, a joint of its own, an actuator, two geoms, two bodies.
+enum Object { PLANAR = 0, BODY = 1, JOINT = 2, PLANAR_YAW = 3, ACTUATOR = 4, GEOM_PAIR = 5, BODY_PAIR = 6 };
 
 typedef struct {
   int32_t kind, object;   // enum Kind, enum Object
-  int32_t id, dof;        // body id (JOINT: joint id); first of its degrees of freedom
+  int32_t id, dof;        // body id (JOINT: joint id); first of its degrees of freedom. Of a pair: its two ids
   double number[N_NUMBERS];
 } Term;
 
@@ -42,12 +44,14 @@ typedef struct {
 } Entry;
 
 typedef void (*ApplyFT)(const mjModel*, mjData*, const mjtNum*, const mjtNum*, const mjtNum*, int, mjtNum*);
+typedef void (*FwdActuation)(const mjModel*, mjData*);
 
 // Open addressing. DELETED keeps chains whole; where a chain ends in them, they turn back into empty slots. So a look-up
 // that runs meanwhile for another model always finds it. Writers hold Python's lock.
 static Entry entries[TABLE];
 static int live;
 static ApplyFT apply_ft;
+static FwdActuation fwd_actuation;
 #define DELETED ((const mjModel*)entries)
 
 static size_t home_of(const mjModel* model) { return ((uintptr_t)model >> 6) * 2654435761u % TABLE; }
@@ -59,9 +63,10 @@ static const Program* find(const mjModel* model) {
 }
 
 // How many kinds of force there are: a library that was compiled from another source has other ones. 0 without them.
-int compass_init(ApplyFT function) {
-  apply_ft = function;
-  return SPRING;
+int compass_init(ApplyFT apply, FwdActuation actuation) {
+  apply_ft = apply;
+  fwd_actuation = actuation;
+  return TETHER;
 }
 
 // Gives a model its program. Returns 0 where it has one already, or where three quarters of the table are taken.
@@ -90,9 +95,11 @@ void compass_forget(const mjModel* model) {
 
 // What a force may depend on: position [m] and velocity [m/s] in the world (JOINT: angle and rate in [0]), inertia.
 // Numbers of a joint are forces and torques themselves: its mass is 1 and it has no weight. `give` is the speed that a
-// unit force takes from it within a step [m/s per N]; 0 for bodies.
+// unit force takes from it within a step [m/s per N]; 0 for bodies. `load`: what drives a joint. Of a body in space also
+// its spin and gravity, in the world.
 typedef struct {
-  double x, y, vx, vy, vz, speed, mass, weight, time, give;
+  double x, y, vx, vy, vz, speed, mass, weight, time, give, load;
+  double spin[3], gravity[3];
 } State;
 
 typedef struct {
@@ -108,6 +115,24 @@ static Force along(const State* s, double magnitude, double creep) {
 
 static double falling(double beyond, double tail) {   // exp(-beyond) without a tail, 1 / (1 + beyond) with a tail of 1
   return exp(tail * fabs(beyond) < 1e-8 ? -beyond : -log1p(tail * beyond) / tail);
+}
+
+static double norm3(const double v[3]) { return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+
+// Gravity turned by two small angles, less gravity [m/s^2]: pushes along two axes across it, those of the world's x and y
+// where gravity points down z.
+static Force tilted(const double g[3], double one, double two) {
+  double size = norm3(g), angle = sqrt(one * one + two * two);
+  if (size == 0 || angle == 0) return (Force){0, 0, 0};
+  double up[3] = {-g[0] / size, -g[1] / size, -g[2] / size}, a[3], b[3];
+  int seed = fabs(up[0]) < 0.9 ? 0 : 1;
+  for (int k = 0; k < 3; k++) a[k] = (k == seed) - up[seed] * up[k];
+  double length = norm3(a), along = size * (cos(angle) - 1), across = size * sin(angle) / angle;
+  for (int k = 0; k < 3; k++) a[k] /= length;
+  for (int k = 0; k < 3; k++) b[k] = up[(k + 1) % 3] * a[(k + 2) % 3] - up[(k + 2) % 3] * a[(k + 1) % 3];
+  double f[3];
+  for (int k = 0; k < 3; k++) f[k] = -along * up[k] + across * (one * a[k] + two * b[k]);
+  return (Force){f[0], f[1], f[2]};
 }
 
 static Force evaluate(const Term* term, const State* s) {
@@ -161,7 +186,12 @@ static Force evaluate(const Term* term, const State* s) {
       double c = r * r + p[3] * p[3], k = -s->mass * p[0] * 2.598076211353316 * p[3] * p[3] / (c * sqrt(c));
       return (Force){k * rx, k * ry, 0};
     }
-    case MAGNUS:           // p: rate
+    case MAGNUS:           // p: rate (BODY: share of spin x velocity)
+      if (term->object == BODY) {
+        const double* w = s->spin;
+        double k = s->mass * p[0];
+        return (Force){k * (w[1] * s->vz - w[2] * s->vy), k * (w[2] * s->vx - w[0] * s->vz), k * (w[0] * s->vy - w[1] * s->vx)};
+      }
       return (Force){-s->mass * p[0] * s->vy, s->mass * p[0] * s->vx, 0};
     case LIBRARY: {        // p: coefficient, powers of x, y, vx, vy, speed; component (0 x, 1 y, 2 against the velocity)
       double value = s->mass * p[0] * pow(s->x, p[1]) * pow(s->y, p[2]) * pow(s->vx, p[3]) * pow(s->vy, p[4]) *
@@ -171,6 +201,27 @@ static Force evaluate(const Term* term, const State* s) {
     }
     case SPRING:           // p: stiffness, rest
       return (Force){-s->mass * p[0] * (s->x - p[1]), 0, 0};
+    case ASYMMETRIC:       // p: extra friction forwards
+      return s->vx > 0 ? along(s, p[0], 0) : (Force){0, 0, 0};
+    case LOAD_FRICTION:    // p: friction as a share of the load
+      return along(s, p[0] * fabs(s->load), 0);
+    case COGGING:          // p: cosine and sine amplitude, periods per turn
+      return (Force){p[0] * cos(p[2] * s->x) + p[1] * sin(p[2] * s->x), 0, 0};
+    case GRAVITY_TILT: {   // p: two angles
+      Force f = tilted(s->gravity, p[0], p[1]);
+      return (Force){s->mass * f.x, s->mass * f.y, s->mass * f.z};
+    }
+    case WIND: {           // p: acceleration at rest x, y, z, speed of the air
+      double a = norm3(p);
+      if (a == 0) return (Force){0, 0, 0};
+      double u[3] = {p[3] * p[0] / a - s->vx, p[3] * p[1] / a - s->vy, p[3] * p[2] / a - s->vz};
+      double k = s->mass * a * norm3(u) / (p[3] * p[3]);
+      return (Force){k * u[0], k * u[1], k * u[2]};
+    }
+    case BUOYANCY: {       // p: share of the weight
+      double k = -s->mass * p[0];
+      return (Force){k * s->gravity[0], k * s->gravity[1], k * s->gravity[2]};
+    }
     case HAT: {            // p: acceleration x, y (JOINT: force), time of the peak, half-width in time
       double k = s->mass * fmax(0, 1 - fabs(s->time - p[2]) / p[3]);
       return (Force){k * p[0], k * p[1], 0};
@@ -215,6 +266,7 @@ static void push(const mjModel* m, mjData* d, const Term* term) {
     s.vx = v[0];
     s.mass = 1;
     s.give = m->opt.timestep / d->qM[m->dof_Madr[term->dof]];
+    if (term->kind == LOAD_FRICTION) s.load = d->qfrc_actuator[term->dof] + d->qfrc_applied[term->dof];
   } else {
     s.x = com[0];
     s.y = com[1];
@@ -226,6 +278,8 @@ static void push(const mjModel* m, mjData* d, const Term* term) {
       s.vx = velocity[0];
       s.vy = velocity[1];
       s.vz = velocity[2];
+      memcpy(s.spin, d->cvel + 6 * term->id, sizeof s.spin);
+      memcpy(s.gravity, m->opt.gravity, sizeof s.gravity);
     } else {
       double rate = term->object == PLANAR_YAW ? v[2] : 0;
       for (int k = 0; k < 2; k++) arm[k] = com[k] - d->xpos[3 * term->id + k];
@@ -294,15 +348,26 @@ static void tangential_impulse(const mjModel* m, mjData* d, const Term* term) {
   }
 }
 
+#include "pairs.h"
+#include "drives.h"
+
 // --- what MuJoCo calls --------------------------------------------------------------------------------------------------
 
 void compass_passive(const mjModel* m, mjData* d) {
   const Program* program = find(m);
   if (!program) return;
+  int driven = 0;   // whether forces of actuators are those of this state: MuJoCo computes them after the passive ones
   for (int64_t i = 0; i < program->n; i++) {
     const Term* term = program->term + i;
-    if (term->kind == RATE_RESTITUTION) rate_dependent_restitution(m, d, term);
-    else if (term->kind == TANGENTIAL) tangential_impulse(m, d, term);
-    else push(m, d, term);
+    if (term->kind == LOAD_FRICTION && !driven) fwd_actuation(m, d), driven = 1;
+    switch (term->kind) {
+      case RATE_RESTITUTION: rate_dependent_restitution(m, d, term); break;
+      case TANGENTIAL: tangential_impulse(m, d, term); break;
+      case ADHESION: adhesion(m, d, term); break;
+      case ROLLING: rolling_resistance(m, d, term); break;
+      case PAIR_ATTRACTION: case TETHER: between(m, d, term); break;
+      case SERVO_DEAD_BAND: servo_dead_band(m, d, term); break;
+      default: push(m, d, term);
+    }
   }
 }

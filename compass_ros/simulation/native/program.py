@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from compass_ros.errors import ConfigError
-from compass_ros.simulation.sites import JOINTS, PLANAR, Site
+from compass_ros.simulation.sites import DRIVES, JOINTS, PLANAR, Site
 from compass_ros.types import Floats
 
 NUMBERS = 8
@@ -45,15 +45,30 @@ class Kind(IntEnum):
     HAT = 19
     TILT = 20
     SPRING = 21
+    ASYMMETRIC = 22
+    LOAD_FRICTION = 23
+    COGGING = 24
+    GRAVITY_TILT = 25
+    WIND = 26
+    BUOYANCY = 27
+    SERVO_DEAD_BAND = 28
+    ADHESION = 29
+    ROLLING = 30
+    PAIR_ATTRACTION = 31
+    TETHER = 32
 
 
 class Placement(IntEnum):
-    """Where a force goes: joints that slide along x and y (and turn about z), any moving body, or a joint."""
+    """Where a force goes: joints that slide along x and y (and turn about z), any moving body, a joint, an actuator, or
+    both of two geoms or bodies."""
 
     PLANAR = 0
     BODY = 1
     JOINT = 2
     PLANAR_YAW = 3
+    ACTUATOR = 4
+    GEOM_PAIR = 5
+    BODY_PAIR = 6
 
 
 @dataclass(frozen=True)
@@ -136,6 +151,14 @@ def _place(model: mujoco.MjModel, site: Site) -> tuple[Placement, int, int]:
     if site.kind in JOINTS:
         joint = model.joint(site.name).id
         return Placement.JOINT, joint, int(model.jnt_dofadr[joint])
+    if site.kind in DRIVES:
+        return Placement.ACTUATOR, site.actuators[0], 0
+    if site.kind == "geom_pair":
+        one, other = (model.geom(name).id for name in site.names)
+        return Placement.GEOM_PAIR, one, other
+    if site.kind == "body_pair":
+        one, other = (model.body(name).id for name in site.names)
+        return Placement.BODY_PAIR, one, other
     body = model.body(site.name).id
     placement = Placement.BODY
     if site.kind in PLANAR:
@@ -173,9 +196,11 @@ def _library() -> ctypes.PyDLL:
     library.compass_forget.restype = None
     library.compass_evaluate.argtypes = [ctypes.c_int64, *2 * [ctypes.c_void_p], ctypes.c_double, ctypes.c_void_p]
     library.compass_evaluate.restype = None
-    library.compass_init.argtypes = [ctypes.c_void_p]
+    library.compass_init.argtypes = 2 * [ctypes.c_void_p]
     library.compass_init.restype = ctypes.c_int
-    if library.compass_init(ctypes.cast(mujoco_library().mj_applyFT, ctypes.c_void_p)) != max(Kind):
+    mj = mujoco_library()
+    called = [ctypes.cast(function, ctypes.c_void_p) for function in (mj.mj_applyFT, mj.mj_fwdActuation)]
+    if library.compass_init(*called) != max(Kind):
         raise ConfigError(f"{path}: was compiled from another version of fields.c; run `make install`")
     callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
     mujoco.set_mjcb_passive(ctypes.cast(library.compass_passive, callback))

@@ -8,6 +8,7 @@ import pytest
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached, effect
 from compass_ros.simulation.effects.effect import Context, Sample
+from compass_ros.simulation.sites import Site
 from compass_ros.types import Floats
 from test.simulation.table import DESCRIBED, cell, simulator, values
 
@@ -115,9 +116,52 @@ def test_the_motion_itself_is_left_alone() -> None:
 def test_each_rollout_has_its_own_number(name: str) -> None:
     hook = effect(name).sensing
     assert hook is not None
-    context = Context((), {}, ((0, 1), (2, 3)), (0, 1, 2, 3), 0.001)
+    vector = Site("sensor", ("it",), columns=(0, 1, 2))
+    context = Context((vector,), {}, ((0, 1), (2, 3)), (0, 1, 2, 3), 0.001)
     amount, *shapes = effect(name).quantities
     numbers = np.array([[size, *(q.start for q in shapes)] for size in (0.0, amount.high)])
     both = hook(line, numbers, context)(np.tile(TIME, (2, 1)))
     np.testing.assert_array_equal(both[0], line(TIME)[0])
     assert np.abs(both[1] - both[0]).max() > 1e-4
+
+
+def encoder(name: str, numbers: tuple[float, ...], true: Floats, columns: tuple[int, ...] = (0,)) -> Floats:
+    """(30, C) what a sensor with a law says of (30, C) true values."""
+    hook = effect(name).sensing
+    assert hook is not None
+    context = Context((Site("encoder", ("it",), columns=columns),), {}, (), (), 0.001)
+    return np.asarray(hook(lambda time: true[None], np.array([numbers]), context)(TIME)[0])
+
+
+def test_a_scale_and_an_offset_of_a_sensor() -> None:
+    true = np.linspace(-2, 3, 60).reshape(30, 2)
+    np.testing.assert_allclose(encoder("scale", (0.03,), true), 1.03 * true)
+    np.testing.assert_allclose(encoder("offset", (-0.2,), true), true - 0.2)
+
+
+@pytest.mark.parametrize("turns", [0.1, 0.5, 1.0, 3.0, 20.0])
+def test_an_eccentric_disc_reads_as_geometry_has_it(turns: float) -> None:
+    """A head at (1, 0) over a disc whose graduation is about a point off the shaft that turns along: to first order."""
+    e, f = 2e-4, -1e-4
+    angle = np.linspace(0, 2 * np.pi * turns, 30)
+    centre = e * np.exp(1j * (angle + 0.4)) + f * np.exp(1j * angle)
+    read = angle - np.unwrap(np.angle(1.0 - centre))  # the disc's own angle under the head
+    cosine, sine = e * np.sin(0.4), e * np.cos(0.4) + f
+    np.testing.assert_allclose(encoder("eccentricity", (cosine, sine), angle[:, None])[:, 0], read, atol=2e-7)
+
+
+@pytest.mark.parametrize(
+    "vector", [(0.2, 0.0, 0.0), (0.0, -0.1, 0.0), (0.0, 0.0, 0.3), (0.1, 0.2, -0.2), (0.0, 0.0, 0.0)]
+)
+def test_a_sensor_askew_turns_each_triple_about_its_own_origin(vector: tuple[float, float, float]) -> None:
+    """About the axis by the angle of the vector: the part along it stays, lengths and angles too (Rodrigues)."""
+    true = np.random.default_rng(0).normal(size=(30, 6))
+    found = encoder("rotation", vector, true, tuple(range(6)))
+    w = np.array(vector)
+    angle = np.linalg.norm(w)
+    axis = w / angle if angle else w
+    for triple in (slice(0, 3), slice(3, 6)):
+        v = true[:, triple]
+        along = (v @ axis)[:, None] * axis
+        expected = np.cos(angle) * (v - along) + along + np.sin(angle) * np.cross(axis, v)
+        np.testing.assert_allclose(found[:, triple], expected, atol=1e-12)

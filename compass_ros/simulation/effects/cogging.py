@@ -1,0 +1,43 @@
+"""A torque that repeats with the angle, as between the magnets and teeth of a motor or from the teeth of a gear.
+
+F = cosine cos(periods q) + sine sin(periods q), a torque; `periods` per turn.
+Source: first harmonic of the cogging torque (Hanselman 2003, ch. 5); behind a gear `periods` need be no whole number.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize, unit_joint
+from compass_ros.types import Floats
+
+_FINEST = 100.0
+"""Periods within the travel; finer ones a joint with any inertia hardly feels, and samples hardly show."""
+
+
+def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
+    return tuple(Term(Kind.COGGING, site, numbers) for site in context.sites)
+
+
+def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
+    """Of less than a period within the travel (uniform: sqrt(12) spreads) one sees a constant push or a spring."""
+    once = max(1.0, 2 * np.pi / (np.sqrt(12) * size.spread))
+    most, scale = LARGEST * size.force, MODEST * size.force
+    return (
+        Quantity("cosine", size.force_unit, -most, most, scale),
+        Quantity("sine", size.force_unit, -most, most, scale),
+        Quantity("periods", "1", once, _FINEST * once, once, amplitude=False, start=4 * once),
+    )
+
+
+EFFECT = Effect(
+    name="cogging",
+    channel="dynamics",
+    quantities=_on_joint(unit_joint("hinge")),
+    sentence="a torque that repeats with the angle",
+    on=("hinge",),
+    forces=_forces,
+    on_joint=_on_joint,
+)

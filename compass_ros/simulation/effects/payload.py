@@ -1,0 +1,72 @@
+"""A mass that the scene lacks: what a gripper holds, a load, a housing.
+
+The body grows by a point `mass` at (x, y, z) from its centre of mass, in its own frame: weight, inertia and centre of
+mass follow. On an arm it belongs on the last link. MuJoCo compiles a body whose mass is at its origin as centred for
+good; on such a one the mass is at the centre. Source: rigid-body dynamics, parallel axes.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from compass_ros.errors import ConfigError
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.simulation.extents import BodySize, unit_body
+from compass_ros.simulation.sizes import LARGEST, MODEST
+from compass_ros.types import Floats
+
+_REACH = 3.0
+"""How far off the centre it may be, in extents of the body."""
+
+
+def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
+    added = float(numbers[0])
+    offset = np.zeros(3)
+    offset[: len(numbers) - 1] = numbers[1:]
+    for site in context.sites if added else ():
+        body = model.body(site.name).id
+        own = float(model.body_mass[body])
+        model.body_mass[body] = own + added
+        if offset.any():
+            _off_centre(model, body, offset, own, added)
+
+
+def _off_centre(model: mujoco.MjModel, body: int, offset: Floats, own: float, added: float) -> None:
+    """Centre and moments of inertia, with the axes of the largest first as MuJoCo has them."""
+    if model.body_simple[body]:
+        raise ConfigError(
+            f"effect 'payload' cannot act beside the centre of '{model.body(body).name}': MuJoCo has compiled it as "
+            "centred for good; give it an <inertial> some micrometres off the centre"
+        )
+    turn = np.zeros(9)
+    mujoco.mju_quat2Mat(turn, model.body_iquat[body])
+    axes = turn.reshape(3, 3)
+    reduced = own * added / (own + added)
+    tensor = axes @ np.diag(model.body_inertia[body]) @ axes.T
+    tensor += reduced * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+    moments, columns = np.linalg.eigh(tensor)
+    columns = columns[:, ::-1]
+    columns[:, 2] = np.cross(columns[:, 0], columns[:, 1])
+    model.body_ipos[body] += offset * added / (own + added)
+    model.body_inertia[body] = moments[::-1]
+    mujoco.mju_mat2Quat(model.body_iquat[body], np.ascontiguousarray(columns).ravel())
+    model.body_sameframe[body] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
+
+
+def _on_body(size: BodySize) -> tuple[Quantity, ...]:
+    reach = _REACH * size.extent
+    mass = Quantity("mass", "kg", 0.0, LARGEST * size.mass, MODEST * size.mass)
+    places = [Quantity(axis, "m", -reach, reach, size.extent, amplitude=False) for axis in "xyz"]
+    return (mass,) if size.centred else (mass, *places)
+
+
+EFFECT = Effect(
+    name="payload",
+    channel="dynamics",
+    quantities=_on_body(unit_body()),
+    sentence="a load that the scene lacks",
+    on=("body",),
+    model=_model,
+    on_body=_on_body,
+)

@@ -1,0 +1,42 @@
+"""A drive that cannot push as hard as its model.
+
+|f| <= 1 / inverse_limit for the force f of an actuator (before its gear), so that zero is absent; a limit that the
+scene has stays where it is tighter. Source: limit of a motor's current; MuJoCo's `forcerange`.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.simulation.sites import SINGLE_DRIVES
+from compass_ros.simulation.sizes import DriveSize
+from compass_ros.types import Floats
+
+
+def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
+    if numbers[0] <= 0:
+        return
+    limit = 1 / numbers[0]
+    for drive in context.sites:
+        for actuator in drive.actuators:
+            bounds = model.actuator_forcerange[actuator] if model.actuator_forcelimited[actuator] else (-limit, limit)
+            model.actuator_forcerange[actuator] = np.clip(bounds, -limit, limit)
+            model.actuator_forcelimited[actuator] = 1
+
+
+def _on_drive(size: DriveSize) -> tuple[Quantity, ...]:
+    """Nothing happens before the limit is the largest force that was seen: a modest one cuts a third of that off."""
+    return (Quantity("inverse_limit", "1", 0.0, 10.0 / size.force, 1.5 / size.force),)
+
+
+EFFECT = Effect(
+    name="torque_saturation",
+    channel="actuation",
+    quantities=_on_drive(DriveSize("effort_drive", 1.0, "1")),
+    sentence="a limit of the drive's force",
+    on=SINGLE_DRIVES,
+    model=_model,
+    on_drive=_on_drive,
+)

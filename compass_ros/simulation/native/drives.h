@@ -1,0 +1,25 @@
+// Forces of one actuator. A part of fields.c.
+
+static double within(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
+
+// A position servo that does nothing while its error is within a band, and beyond it answers what is more: what it exerts
+// then less what MuJoCo lets it exert. p: half of the band, in units of the command.
+static void servo_dead_band(const mjModel* m, mjData* d, const Term* term) {
+  int i = term->id;
+  const mjtNum *gain = m->actuator_gainprm + i * mjNGAIN, *bias = m->actuator_biasprm + i * mjNBIAS;
+  double told = d->ctrl[i];
+  if (m->actuator_ctrllimited[i])
+    told = within(told, m->actuator_ctrlrange[2 * i], m->actuator_ctrlrange[2 * i + 1]);
+  if (m->actuator_actnum[i]) told = d->act[m->actuator_actadr[i] + m->actuator_actnum[i] - 1];
+  double error = told + (bias[0] + bias[1] * d->actuator_length[i]) / gain[0];
+  double force = gain[0] * error + bias[2] * d->actuator_velocity[i];
+  double less = force - gain[0] * within(error, -term->number[0], term->number[0]);
+  if (m->actuator_forcelimited[i]) {
+    const mjtNum* range = m->actuator_forcerange + 2 * i;
+    force = within(force, range[0], range[1]);
+    less = within(less, range[0], range[1]);
+  }
+  const int first = d->moment_rowadr[i], count = d->moment_rownnz[i];
+  for (int k = first; k < first + count; k++)
+    d->qfrc_passive[d->moment_colind[k]] += d->actuator_moment[k] * (less - force);
+}
