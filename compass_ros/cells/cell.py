@@ -23,6 +23,8 @@ class Cell:
     spec: CellSpec
     path: Path
     hash: str
+    rotors: tuple[str, ...] = ()
+    """Joints whose motors are bodies of their own in the compiled scene (`cells/rotors.py`)."""
 
     @property
     def name(self) -> str:

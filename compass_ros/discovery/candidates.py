@@ -14,9 +14,9 @@ from compass_ros.types import Floats
 ALIKE: tuple[tuple[SiteKind, ...], ...] = (PLANAR, *((kind,) for kind in JOINTS))
 """What moves in the same way: one number of an effect means the same for all of them."""
 
-BY_NAME_ALONE = frozenset({"load_dependent_friction", "cogging", "torque_saturation"})
-"""Laws that first order, as it is here, cannot rank: a load is no part of a path, a period is not found from four
-starts, and a limit does nothing before it is the largest force that was seen. They can be attached by name."""
+BY_NAME_ALONE = frozenset({"load_dependent_friction", "cogging", "joint_elasticity", "backlash", "torque_saturation"})
+"""Laws that first order, as it is here, cannot rank: a load and a motor's angle are no part of a path, a period is
+not found from four starts, and a limit does nothing before it is the largest force. They can be attached by name."""
 
 
 @dataclass(frozen=True)

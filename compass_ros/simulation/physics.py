@@ -12,6 +12,7 @@ import numpy as np
 from compass_ros.cells import Cell
 from compass_ros.cells.drives import Drive, Drives
 from compass_ros.cells.dynamics import Dynamics
+from compass_ros.cells.rotors import rotors
 from compass_ros.cells.sensors import units_of
 from compass_ros.cells.signals import Signal
 from compass_ros.simulation.effects.attached import Attached
@@ -113,6 +114,9 @@ class Physics:
         start[:, 1 : 1 + nq], start[:, 1 + nq : 1 + nq + nv] = self.dynamics.start(
             self.of_cell(values), self.of_command(inputs)
         )
+        for joint, rotor in rotors(self.model):  # in the middle of its play
+            for first, places in ((1, self.model.jnt_qposadr), (1 + nq, self.model.jnt_dofadr)):
+                start[:, first + places[rotor]] = start[:, first + places[joint]]
         return start
 
     def controls(self, values: Floats, inputs: Floats, steps: int) -> Floats | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import os
+from dataclasses import dataclass
 
 import mujoco
 from mujoco.rollout import Rollout
@@ -14,15 +15,22 @@ from compass_ros.simulation.warned import Warned
 from compass_ros.types import Floats
 
 
+@dataclass
+class Spent:
+    """What rollouts have cost so far."""
+
+    rollouts: int = 0
+    simulated_seconds: float = 0.0
+
+
 class Player:
     """Threads, models and data for rollouts of one scene, and what they have cost so far."""
 
-    def __init__(self, scene: mujoco.MjModel, threads: int = 0) -> None:
-        """`threads`: 0 takes all cores."""
+    def __init__(self, scene: mujoco.MjModel, threads: int = 0, like: Player | None = None) -> None:
+        """`threads`: 0 takes all cores; `like`: one of another scene, with which costs and warnings are counted."""
         self.threads = threads or len(os.sched_getaffinity(0))
-        self.rollouts = 0
-        self.simulated_seconds = 0.0
-        self.warned = Warned()
+        self.spent: Spent = like.spent if like else Spent()
+        self.warned: Warned = like.warned if like else Warned()
         self._scene = scene
         self._models = [copy.copy(scene)]
         self._data = [mujoco.MjData(scene) for _ in range(self.threads)]
@@ -50,6 +58,6 @@ class Player:
                 states, sensors = self._pool.rollout(
                     models, self._data, start, controls, control_spec=physics.drives.parts, nstep=steps
                 )
-        self.rollouts += len(values)
-        self.simulated_seconds += len(values) * steps * physics.time_step
+        self.spent.rollouts += len(values)
+        self.spent.simulated_seconds += len(values) * steps * physics.time_step
         return states, sensors

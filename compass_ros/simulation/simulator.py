@@ -42,6 +42,11 @@ class Motion:
     """(B, T + 1, C) observed columns before any effect of the sensor."""
 
 
+def with_rotors(cell: Cell, effects: Sequence[Attached]) -> Cell:
+    """The cell whose scene has the rotors that effects act on, and no others."""
+    return replace(cell, rotors=tuple(dict.fromkeys(n for a in effects if a.effect.rotor for n in a.objects)))
+
+
 class Simulator:
     """Rolls out a cell with attached effects on all cores.
 
@@ -55,11 +60,13 @@ class Simulator:
     ) -> None:
         """`options`: MuJoCo's numerics (`timestep`, `cone`, `solver`, ...) where they are not to be the scene's."""
         dynamics = dynamics_of(cell)
-        for name, value in (options or {}).items():
+        self._options = options or {}
+        for name, value in self._options.items():
             setattr(dynamics.model.opt, name, value)
         drives = Drives(cell, dynamics.model)
-        self.physics = Physics(cell, dynamics, places_of(cell, dynamics), tuple(effects), drives)
-        self._player = Player(dynamics.model, threads)
+        self.physics = Physics(cell, dynamics, places_of(cell, dynamics), (), drives)
+        self._players: dict[tuple[str, ...], Player] = {(): Player(dynamics.model, threads)}
+        self.physics = self._taking(effects)
 
     @property
     def cell(self) -> Cell:
@@ -71,17 +78,17 @@ class Simulator:
 
     @property
     def threads(self) -> int:
-        return self._player.threads
+        return self._players[()].threads
 
     @property
     def rollouts(self) -> int:
         """Rollouts so far, of this simulator and of all that share its cell (`with_effects`)."""
-        return self._player.rollouts
+        return self._player.spent.rollouts
 
     @property
     def simulated_seconds(self) -> float:
         """The same in simulated time."""
-        return self._player.simulated_seconds
+        return self._player.spent.simulated_seconds
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -91,8 +98,28 @@ class Simulator:
     def with_effects(self, effects: Sequence[Attached]) -> Simulator:
         """The same cell with other effects. Shares threads, models and counters with this one: use one at a time."""
         other = copy.copy(self)
-        other.physics = replace(self.physics, effects=tuple(effects))
+        other.physics = self._taking(effects)
         return other
+
+    def _taking(self, effects: Sequence[Attached]) -> Physics:
+        """The physics with these effects, of the scene with the rotors that they act on."""
+        physics, cell = replace(self.physics, effects=tuple(effects)), with_rotors(self.cell, effects)
+        if cell.rotors == self.cell.rotors:
+            return physics
+        dynamics = dynamics_of(cell)
+        for name, value in self._options.items():
+            setattr(dynamics.model.opt, name, value)
+        return replace(physics, cell=cell, dynamics=dynamics, drives=Drives(cell, dynamics.model))
+
+    @property
+    def _player(self) -> Player:
+        """Of the scene with these rotors. That without any is kept, and the last one with some."""
+        rotors = self.cell.rotors
+        if rotors not in self._players:
+            plain = self._players[()]
+            self._players.clear()
+            self._players.update({(): plain, rotors: Player(self.physics.model, plain.threads, like=plain)})
+        return self._players[rotors]
 
     def driven(self, bank: Sequence[Drive]) -> Simulator:
         """The same with recorded inputs, of which the input `window` names one. Shares what `with_effects` shares."""

@@ -95,6 +95,8 @@ class Effect:
     """Its quantities between two geoms or bodies; None: it acts on no pair."""
     on_signal: Callable[[SignalSize], tuple[Quantity, ...]] | None = None
     """Its quantities on one signal, from what that shows; None: `quantities`."""
+    rotor: bool = False
+    """Whether it acts between a joint and its motor, which the scene is then compiled with (`cells/rotors.py`)."""
     by_name: bool = False
     """Whether it acts on what is named alone, and means nothing for all of a kind."""
     unable: Callable[[mujoco.MjModel, Site], str] | None = None
@@ -143,18 +145,27 @@ class Effect:
 
 
 RESTORED = (
-    "geom_pos",
-    "geom_quat",
-    "geom_sameframe",
-    "geom_solref",
     "actuator_forcelimited",
     "actuator_forcerange",
+    "actuator_trnid",
     "body_inertia",
     "body_ipos",
     "body_iquat",
     "body_mass",
     "body_sameframe",
+    "dof_armature",
+    "geom_pos",
+    "geom_quat",
+    "geom_sameframe",
+    "geom_solref",
     "pair_solref",
+    "sensor_objid",
+    "tendon_damping",
+    "tendon_lengthspring",
+    "tendon_limited",
+    "tendon_range",
+    "tendon_solref_lim",
+    "tendon_stiffness",
 )
 """Arrays of a model that effects may change, beside the friction cone in its options."""
 

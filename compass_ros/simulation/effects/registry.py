@@ -13,7 +13,7 @@ _NAMES = (
     *("table_tilt", "viscous_drag", "quadratic_drag", "crosswind", "fan_field", "swirl", "point_attraction"),
     *("friction_patch", "friction_gradient", "anisotropic_friction", "stribeck_friction", "coulomb_friction"),
     *("magnus", "pulsating_lift", "spring"),
-    *("asymmetric_friction", "load_dependent_friction", "cogging"),
+    *("asymmetric_friction", "load_dependent_friction", "cogging", "joint_elasticity", "backlash"),
     *("gravity_tilt", "payload", "wind", "buoyancy", "pair_attraction", "tether"),
     *("rate_dependent_restitution", "tangential_impulse", "local_wall", "off_centre_mass", "friction_cone"),
     *("adhesion", "rolling_resistance"),

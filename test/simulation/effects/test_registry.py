@@ -16,11 +16,12 @@ from scripts.effects_table import BEGIN, END, PAGE, formula, table
 from test.simulation.table import DESCRIBED, WIDE, attached, cell, simulator, values
 
 UNITS = {"1", "m", "s", "rad", "Hz", "m/s", "m/s^2", "1/m", "1/s", "s/m", "1/m^2", "N m/rad"}
-UNITS |= {"N", "N m", "N/m", "kg"}
+UNITS |= {"N", "N m", "N/m", "kg", "kg m^2", "rad/N m"}
 NAMES = {
     "dynamics": "table_tilt viscous_drag quadratic_drag crosswind fan_field swirl point_attraction friction_patch "
     "friction_gradient anisotropic_friction stribeck_friction coulomb_friction magnus pulsating_lift spring "
-    "asymmetric_friction load_dependent_friction cogging gravity_tilt payload wind buoyancy pair_attraction tether",
+    "asymmetric_friction load_dependent_friction cogging joint_elasticity backlash gravity_tilt payload wind buoyancy "
+    "pair_attraction tether",
     "contact": "rate_dependent_restitution tangential_impulse local_wall off_centre_mass friction_cone "
     "adhesion rolling_resistance",
     "actuation": "actuation_delay first_order_lag velocity_saturation dead_band heading_bias stroke_jitter "

@@ -29,6 +29,8 @@ NEW: dict[str, tuple[str, ...]] = {
     "asymmetric_friction": ("shoulder", "elbow"),
     "load_dependent_friction": ("shoulder",),
     "cogging": ("elbow",),
+    "joint_elasticity": ("shoulder",),
+    "backlash": ("shoulder", "elbow"),
     "gravity_tilt": ("ball", "upper", "lower"),
     "payload": ("lower",),
     "viscous_drag": ("ball",),
