@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import mujoco
@@ -40,7 +41,7 @@ def geared(folder: Path, drive: str = "position", armature: float = ROTOR, kind:
     return written(folder, scene, made)
 
 
-def angle(cell: Cell, numbers: dict[str, tuple[float, ...]], told: float = TOLD, kind: str = "hinge") -> Floats:
+def angle(cell: Cell, numbers: Mapping[str, tuple[float, ...]], told: float = TOLD, kind: str = "hinge") -> Floats:
     """(T, 2) angle of the link and effort of the motor, with laws on the joint."""
     laws = [Attached(effect(name).at(unit_joint(kind)), ("axis",)) for name in numbers]  # type: ignore[arg-type]
     simulator = Simulator(cell, laws, threads=1)
