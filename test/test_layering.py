@@ -63,8 +63,13 @@ HOMES = {
 """Which parts of the package may import these libraries."""
 HOME = {library: parts for libraries, parts in HOMES.items() for library in libraries}
 
-GUESTS = {"calibration/rivals/mujoco_sysid.py": {"mujoco"}}
-"""Single modules that may import a library away from its home: this rival is MuJoCo's own system identification."""
+GUESTS = {
+    "calibration/rivals/mujoco_sysid.py": {"mujoco"},
+    "rivals/inertias.py": {"mujoco"},
+    "rivals/inverse_dynamics.py": {"mujoco"},
+}
+"""Single modules that may import a library away from its home: rivals that are MuJoCo's own system identification, and
+regression on its inverse dynamics."""
 
 PROGRAMS = {"concealed/blind.py"}
 """Modules that are processes of their own: they may call the command line, and nobody imports them."""
