@@ -1,7 +1,8 @@
 """A sensor that is mounted askew.
 
 observed = R true, R the rotation by the vector (x, y, z) in the sensor's frame, for each triple of a position, wrench,
-gyroscope or accelerometer. Source: error of the extrinsic calibration; `camera_rotation` in three dimensions.
+gyroscope or accelerometer, and for a pose's orientation. Source: error of the extrinsic calibration; `camera_rotation`
+in three dimensions.
 """
 
 from __future__ import annotations
@@ -14,28 +15,41 @@ from compass_ros.simulation.effects.effect import Context, Effect, Quantity, Sam
 from compass_ros.simulation.sites import Site
 from compass_ros.types import Floats
 
-_VECTORS = ("xyz", "position", "wrench", "gyro", "accelerometer")
+_VECTORS = ("xyz", "position", "pose", "wrench", "gyro", "accelerometer")
+_POSE = 7
+"""Numbers of a pose."""
 
 
 def _sensing(sample: Sample, numbers: Floats, context: Context) -> Sample:
-    turned = Rotation.from_rotvec(numbers).as_matrix()  # (B, 3, 3)
+    turn = Rotation.from_rotvec(numbers)
+    matrix, quaternion = turn.as_matrix(), turn.as_quat()[:, None]  # (B, 3, 3), (B, 1, 4) with the scalar last
     absent = ~numbers.any(axis=1)[:, None, None]
 
     def rotated(time: Floats) -> Floats:
         seen = sample(time)
         out = seen.copy()
         for site in context.sites:
-            for first in range(0, len(site.columns), 3):
-                triple = list(site.columns[first : first + 3])
-                out[:, :, triple] = np.einsum("bij,bfj->bfi", turned, seen[:, :, triple])
+            vectors = site.columns[:3] if len(site.columns) == _POSE else site.columns
+            for first in range(0, len(vectors), 3):
+                triple = list(vectors[first : first + 3])
+                out[:, :, triple] = np.einsum("bij,bfj->bfi", matrix, seen[:, :, triple])
+            if len(site.columns) == _POSE:
+                out[:, :, site.columns[3:]] = _product(quaternion, seen[:, :, site.columns[3:]])
         return np.where(absent, seen, out)
 
     return rotated
 
 
+def _product(one: Floats, other: Floats) -> Floats:
+    """(B, F, 4) of a (B, 1, 4) quaternion with the scalar last and (B, F, 4) with it first, as these are."""
+    v, w, scalar, vector = one[..., :3], one[..., 3:], other[..., :1], other[..., 1:]
+    along = np.sum(v * vector, axis=-1, keepdims=True)
+    return np.concatenate([w * scalar - along, w * vector + scalar * v + np.cross(v, vector)], axis=-1)
+
+
 def _unable(model: mujoco.MjModel, site: Site) -> str:
-    whole = site.quantity in _VECTORS and len(site.columns) % 3 == 0
-    return "" if whole else f"it is no vector in space, but {site.quantity}"
+    whole = len(site.columns) == _POSE if site.quantity == "pose" else not len(site.columns) % 3
+    return "" if site.quantity in _VECTORS and whole else "it is no vector in space"
 
 
 EFFECT = Effect(

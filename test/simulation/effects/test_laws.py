@@ -79,6 +79,19 @@ def test_a_plain_model_with_a_law_from_its_file_moves_as_the_simulator_does(
     assert (np.array(rows) == expected[1:301]).all()
 
 
+@pytest.mark.parametrize("name", NEW)
+def test_a_law_comes_back_from_its_file_with_sites_and_units(simulator: Simulator, name: str, tmp_path: Path) -> None:
+    law = sized(simulator, name)
+    numbers = tuple(amounts(law)[1].tolist())
+    write_effects([FittedEffect(law, numbers, numbers)], {}, tmp_path / "effects.yaml")
+    (back,) = read_effects(tmp_path / "effects.yaml").effects
+    assert (back.values, back.std, back.attached.objects) == (numbers, numbers, law.objects)
+    assert [(q.name, q.unit) for q in back.attached.effect.quantities] == [
+        (q.name, q.unit) for q in law.effect.quantities
+    ]
+    assert back.attached.sites(simulator.places) == law.sites(simulator.places)
+
+
 @pytest.mark.parametrize("name", [n for n in NEW if not (EFFECTS[n].forces or EFFECTS[n].model)])
 def test_what_acts_outside_a_model_is_said_so(simulator: Simulator, name: str) -> None:
     model = mujoco.MjModel.from_xml_path(str(simulator.cell.model_path))

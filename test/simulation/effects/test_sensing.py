@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached, effect
@@ -165,3 +166,18 @@ def test_a_sensor_askew_turns_each_triple_about_its_own_origin(vector: tuple[flo
         along = (v @ axis)[:, None] * axis
         expected = np.cos(angle) * (v - along) + along + np.sin(angle) * np.cross(axis, v)
         np.testing.assert_allclose(found[:, triple], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_camera_askew_turns_a_pose_as_a_whole(seed: int) -> None:
+    """Any point of the body is seen where the rotation puts it."""
+    rng = np.random.default_rng(seed)
+    turn, pose = rng.normal(size=3), np.append(rng.normal(size=3), rng.normal(size=4))
+    pose[3:] /= np.linalg.norm(pose[3:])
+    (found,) = encoder("rotation", tuple(turn), np.tile(pose, (30, 1)), tuple(range(7)))[:1]
+    point, rotation = rng.normal(size=3), Rotation.from_rotvec(turn)
+
+    def seen_at(p: Floats) -> Floats:
+        return np.asarray(p[:3] + Rotation.from_quat(p[[4, 5, 6, 3]]).apply(point))
+
+    np.testing.assert_allclose(seen_at(found), rotation.apply(seen_at(pose)), atol=1e-12)
