@@ -39,7 +39,7 @@ def write_all(
         _map(found.after),
         dict(truth or {}),
     )
-    if cell.path.parent != cells_folder():
+    if cell.path != cells_folder() / f"{cell.name}.yaml":
         result = replace(result, cell_file=os.path.relpath(cell.path, out))
     write_report(result, out / REPORT, extras)
     write_trajectories(result, out / TRAJECTORIES, extras)

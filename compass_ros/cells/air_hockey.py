@@ -10,10 +10,14 @@ import numpy as np
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.dynamics import Sliding
 from compass_ros.cells.keyframe import begun, first_state
+from compass_ros.cells.sensors import columns_of
 from compass_ros.errors import ConfigError, nearest
 from compass_ros.types import Floats, Ints
 
 _PUCKS = ("puck1", "puck2")
+_UNYIELDING = 1e4
+"""Mass and gain of a tool that follows a measured path, in those of one that is commanded: it lags as that one does,
+and a puck does not push it beyond what was measured, which holds the recoil already."""
 _MOVING = ("pusher", *_PUCKS)
 _WALLS = ("front_wall", "back_wall", "left_wall", "right_wall")
 _FIXED = (*_WALLS, "obstacle")
@@ -53,6 +57,9 @@ class AirHockey:
         self._partners = np.stack([self._model.pair_geom1, self._model.pair_geom2])  # (2, npair)
         self._rest = {name: self._model.body(name).pos[:2].copy() for name in _MOVING}
         self._first = first_state(begun(self._model), self._model)
+        self._tool = _UNYIELDING if any(spec.measured for spec in cell.spec.inputs) else 1.0
+        further = [columns_of(self._model, signal, str(cell.path)) for signal in cell.signals[len(_PUCKS) :]]
+        self._columns: Ints = np.concatenate([*map(self._of_puck, _PUCKS), *further])
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -83,7 +90,7 @@ class AirHockey:
         for name in _MOVING:
             geom, body, dof = m.geom(name).id, m.body(name).id, m.joint(f"{name}_x").dofadr[0]
             f["geom_size"][:, geom, 0] = f["geom_rbound"][:, geom] = column(f"{name}@shape@radius")
-            mass = column(f"{name}@dyna@mass")
+            mass = column(f"{name}@dyna@mass") * (self._tool if name == "pusher" else 1.0)
             f["body_mass"][:, body] = mass
             f["body_inertia"][:, body] *= (mass / m.body_mass[body])[:, None]
             f["dof_armature"][:, dof : dof + 2] = column(f"{name}@dyna@armature")[:, None]
@@ -97,7 +104,7 @@ class AirHockey:
         sizes = (column("obstacle@shape@width"), column("obstacle@shape@length"))
         f["geom_size"][:, bar, :2] = 0.5 * np.stack(sizes, axis=1)
         f["geom_rbound"][:, bar] = np.linalg.norm(f["geom_size"][:, bar], axis=1)
-        gain, pusher = column("pusher@actuation@servo_gain")[:, None], m.joint("pusher_x").dofadr[0]
+        gain, pusher = column("pusher@actuation@servo_gain")[:, None] * self._tool, m.joint("pusher_x").dofadr[0]
         f["actuator_gainprm"][:, :, 0] = gain
         f["actuator_biasprm"][:, :, 2] = -gain
         f["dof_damping"][:, pusher : pusher + 2] = column("pusher@dyna@joint_damping")[:, None]
@@ -153,11 +160,16 @@ class AirHockey:
         )
 
     def columns(self) -> Ints:
-        return np.array([self._model.joint(f"{name}_{axis}").qposadr[0] for name in _PUCKS for axis in "xy"])
+        return self._columns
 
     def observe(self, values: Floats, positions: Floats) -> Floats:
+        """The camera sees the pucks with its bias; encoders say what they are at."""
         rest = np.concatenate([self._rest[name] for name in _PUCKS])
-        return np.asarray(positions + rest + np.tile(self._bias(values), 2)[:, None, :])
+        seen = positions[:, :, :4] + rest + np.tile(self._bias(values), 2)[:, None, :]
+        return np.concatenate([seen, positions[:, :, 4:]], axis=2)
+
+    def _of_puck(self, name: str) -> Ints:
+        return np.array([self._model.joint(f"{name}_{axis}").qposadr[0] for axis in "xy"])
 
     def poses(self, values: Floats, positions: Floats) -> Mapping[str, Floats]:
         out = {}
@@ -181,6 +193,11 @@ def _check(cell: Cell) -> None:
     missing = sorted(PARAMETERS.difference(names))
     if missing:
         raise ConfigError(f"{cell.path}: parameters: {missing[0]} is missing; the table has {len(PARAMETERS)}")
+    tracked = [(o.name, o.quantity) for o in cell.objects]
+    if tracked != [(name, "xy") for name in _PUCKS]:
+        raise ConfigError(f"{cell.path}: objects: expected {' and '.join(_PUCKS)}, each xy")
+    if others := [s.name for s in cell.spec.signals if s.quantity not in ("joint_position", "joint_velocity")]:
+        raise ConfigError(f"{cell.path}: signals: {others[0]}: the table has positions and velocities of joints")
     actions = [a.name for a in cell.action]
     if actions != ["x", "y", "angle", "velocity"]:
         raise ConfigError(f"{cell.path}: action: expected x, y, angle, velocity, found {', '.join(actions)}")

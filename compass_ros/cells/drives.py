@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -19,6 +19,7 @@ _PARTS = (_STATE.mjSTATE_CTRL, _STATE.mjSTATE_QFRC_APPLIED, _STATE.mjSTATE_XFRC_
           _STATE.mjSTATE_MOCAP_QUAT)  # fmt: skip
 """In the order in which MuJoCo packs them."""
 _OF_TARGET = {"ctrl": 0, "qfrc": 1, "xfrc": 2, "mocap": 3}
+_ONE = {int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)}
 FIELDS = {"input_delay_s": "delay_s", "input_scale": "scale", "input_offset": "offset"}
 """Parameters of an input, and the number of its YAML that each takes the place of."""
 
@@ -53,7 +54,20 @@ class Drives:
         self.parts = parts
         """mjtState bits of a row of controls."""
         self._rest = _at_rest(model, self._offsets, self.size)
-        self._bound = [_Bound(cell, spec, self._places(model, spec, where), where) for spec in cell.spec.inputs]
+        self._bound = [
+            _Bound(cell, spec, self._places(model, spec, where), _followers(model, spec, where), where)
+            for spec in cell.spec.inputs
+        ]
+        self.commanded = frozenset(range(model.nu)) - {a for b in self._bound for a in b.followers}
+        """Actuators that are told what to do; the others follow what was measured."""
+
+    def begin(self, positions: Floats, values: Floats, inputs: Floats, bank: Sequence[Drive]) -> None:
+        """Put the joints that follow a measured path where it begins, in (B, nq) positions."""
+        if not bank:
+            return
+        window = inputs[:, self._column].astype(int)
+        for i, bound in enumerate(self._bound):
+            bound.begin(positions, values, window, [d.time_s[i] for d in bank], [d.value[i] for d in bank])
 
     def fill(self, controls: Floats, values: Floats, inputs: Floats, bank: Sequence[Drive], time_step: float) -> Floats:
         """(B, T, size) what drives MuJoCo: (B, T, nu) controls with the recorded inputs of each row's window in place.
@@ -91,10 +105,13 @@ class Drives:
 
 
 class _Bound:
-    """One input: where it goes, and which parameters move it."""
+    """One input: where it goes, which parameters move it, and which actuators only follow it."""
 
-    def __init__(self, cell: Cell, spec: InputSpec, places: Ints, where: str) -> None:
-        self._spec, self._places = spec, places
+    def __init__(
+        self, cell: Cell, spec: InputSpec, places: Ints, followers: Mapping[int, _Follower], where: str
+    ) -> None:
+        self._spec, self._places, self.followers = spec, places, followers
+        self._rated = np.array([f.rated for f in followers.values()] or [False] * len(places))
         self._numbers = {name: _Number(cell, spec, name, getattr(spec, name), where) for name in FIELDS.values()}
 
     def write(
@@ -106,10 +123,44 @@ class _Bound:
         for k, key in enumerate(keys):
             own = int(key[0])
             means = held(time_s[own], value[own], edges, key[1:], self._spec.hold == "linear")
+            if self._rated.any():
+                rates = _rates(time_s[own], value[own], edges, key[1:])
+                means = np.where(self._rated, rates, means)
             chosen = np.flatnonzero(which.ravel() == k)
             out[np.ix_(chosen, np.arange(out.shape[1]), self._places)] = (
-                means * scale[chosen][:, None] + offset[chosen][:, None]
+                means * scale[chosen][:, None] + np.where(self._rated, 0.0, offset[chosen])[:, None]
             )
+
+    def begin(self, positions: Floats, values: Floats, window: Ints, time_s: list[Floats], value: list[Floats]) -> None:
+        scale, offset = (self._numbers[name].of(values) for name in ("scale", "offset"))
+        for number, follower in enumerate(self.followers.values()):
+            first = [float(np.interp(0.0, time_s[own], value[own][:, number])) for own in window]
+            positions[:, follower.joint] = np.array(first) * scale[:, number] + offset[:, number]
+
+
+@dataclass(frozen=True)
+class _Follower:
+    """An actuator that follows a measured path."""
+
+    joint: int
+    """Place of its joint in qpos."""
+    rated: bool
+    """Whether it is told a velocity."""
+
+
+def _followers(model: mujoco.MjModel, spec: InputSpec, where: str) -> dict[int, _Follower]:
+    """By actuator, in the order of the numbers; empty where the input is a command."""
+    out = {}
+    for target in spec.targets if spec.measured else ():
+        actuator = int(rows(model, "actuator", target, f"{where}: inputs: {spec.name}")[0])
+        joint, bias = int(model.actuator_trnid[actuator, 0]), model.actuator_biasprm[actuator]
+        servo = int(model.actuator_biastype[actuator]) == mujoco.mjtBias.mjBIAS_AFFINE and (bias[1] or bias[2])
+        on_joint = int(model.actuator_trntype[actuator]) == mujoco.mjtTrn.mjTRN_JOINT
+        if not (servo and on_joint and int(model.jnt_type[joint]) in _ONE):
+            said = "expected a position or velocity servo of a hinge or slide"
+            raise ConfigError(f"{where}: inputs: {spec.name}: measured: actuator '{target}': {said}")
+        out[actuator] = _Follower(int(model.jnt_qposadr[joint]), not bias[1])
+    return out
 
 
 class _Number:
@@ -160,6 +211,12 @@ def held(time_s: Floats, value: Floats, edges: Floats, delay: Floats, linear: bo
         kept = (place[1:] == place[:-1])[:, None] & (not linear)
         out[:, columns] = np.where(kept, first[place[:-1]], mean)
     return out
+
+
+def _rates(time_s: Floats, value: Floats, edges: Floats, delay: Floats) -> Floats:
+    """(T, D) mean rate of the lines between a series' rows over each time step, each number late by its delay."""
+    rates = [np.diff(np.interp(edges - late, time_s, own)) for late, own in zip(delay, value.T, strict=True)]
+    return np.asarray(np.stack(rates, axis=1) / np.diff(edges)[:, None])
 
 
 def _check_parameters(cell: Cell, where: str) -> None:

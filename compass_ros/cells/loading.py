@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
 
 from compass_ros.cells.auto import with_auto
@@ -12,7 +13,7 @@ from compass_ros.cells.registry import dynamics_of
 from compass_ros.cells.scene_files import scene_files
 from compass_ros.cells.spec import validated_spec
 from compass_ros.config import Parameters, read_yaml
-from compass_ros.errors import ConfigError, nearest
+from compass_ros.errors import ConfigError, nearest, shown
 
 _builtin = Path(__file__).parents[1] / "config" / "cells"
 
@@ -33,18 +34,39 @@ def load(name_or_path: str | Path, parameters: Parameters = "cell") -> Cell:
                 f"unknown cell '{name_or_path}'; known: {', '.join(known)}{nearest(str(name_or_path), known)}"
             )
         path = cells_folder() / f"{name_or_path}.yaml"
-    spec = validated_spec(read_yaml(path), str(path))
+    content, bases = _whole(path)
+    spec = validated_spec(content, str(path))
     model = path.parent / spec.model
     if not model.is_file():
         raise ConfigError(f"{path}: model: no file {model}")
-    cell = Cell(spec, path, _hash(path, model))
+    cell = Cell(spec, path, _hash([path, *bases], model))
     Drives(cell, dynamics_of(cell).model)
     return with_auto(cell) if spec.auto or parameters == "auto" else cell
 
 
-def _hash(path: Path, model: Path) -> str:
-    """Of the YAML, of the scene, and of all files that the scene is made of."""
-    contents = [path, model, *scene_files(model).further]
+def _whole(path: Path, above: tuple[Path, ...] = ()) -> tuple[dict[str, object], list[Path]]:
+    """A YAML's content, with what it has not itself from the YAML that it extends; the YAMLs below it.
+
+    Raises ConfigError.
+    """
+    content = dict(read_yaml(path))
+    given = content.pop("extends", None)
+    if given is None:
+        return content, []
+    if not isinstance(given, str):
+        raise ConfigError(f"{path}: extends: expected the path of a cell's YAML, found {shown(given)}")
+    base = path.parent / given
+    if base in above:
+        raise ConfigError(f"{path}: extends: {given} extends this one itself")
+    below, bases = _whole(base, (*above, path))
+    if "model" in below:
+        below["model"] = str((base.parent / str(below["model"])).absolute())
+    return below | content, [base, *bases]
+
+
+def _hash(yamls: Sequence[Path], model: Path) -> str:
+    """Of the YAML and those that it extends, of the scene, and of all files that the scene is made of."""
+    contents = [*yamls, model, *scene_files(model).further]
     return hashlib.sha256(b"".join(file.read_bytes() for file in contents)).hexdigest()[:16]
 
 

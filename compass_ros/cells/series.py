@@ -19,6 +19,8 @@ Numbers = float | tuple[float, ...]
 ControllerPart = Literal["reference", "feedback", "output"]
 """Of a controller's state: what it was asked for, what it measured, what it put out."""
 OF_JOINTS: frozenset[Quantity] = frozenset({"joint_position", "joint_velocity", "joint_effort"})
+PLACES = ("joint_position", "position", "pose")
+"""What a measured path can be told in."""
 _MOST_MOCAP, _MOST_WRENCH = 7, 6
 
 
@@ -51,6 +53,9 @@ class InputSpec:
     delay_s: Numbers = 0.0
     scale: Numbers = 1.0
     offset: Numbers = 0.0
+    measured: bool = False
+    """`ctrl`: it says where the joints of the actuators really were, and not what was asked for. The joints begin
+    there, velocity drives are told how fast it changes, and no law of actuation acts on what follows it."""
 
     @property
     def numbers(self) -> tuple[str, ...]:
@@ -102,32 +107,40 @@ class WindowSpec:
 def check_series(inputs: Sequence[InputSpec], signals: Sequence[SignalSpec], where: str) -> None:
     """Raises ConfigError where an input or a signal contradicts itself."""
     for one in inputs:
-        here = f"{where}: inputs: {one.name}"
-        if not one.numbers:
-            raise ConfigError(f"{here}: of: missing; say which joints (or numbers) the {one.quantity} is of")
-        _known_numbers(one.of, one.quantity, here)
-        for what in ("delay_s", "scale", "offset"):
-            given = getattr(one, what)
-            if isinstance(given, tuple) and len(given) != len(one.numbers):
-                raise ConfigError(f"{here}: {what}: expected 1 or {len(one.numbers)} numbers, found {len(given)}")
-        if one.to in ("ctrl", "qfrc") and len(one.targets) != len(one.numbers):
-            raise ConfigError(
-                f"{here}: {len(one.numbers)} numbers ({', '.join(one.numbers)}) for {len(one.targets)} targets "
-                f"({', '.join(one.targets)})"
-            )
-        if one.to in ("mocap", "xfrc"):
-            expected = "pose" if one.to == "mocap" else "wrench"
-            size = _MOST_MOCAP if one.to == "mocap" else _MOST_WRENCH
-            if one.quantity not in (expected, "position") or len(one.numbers) not in (size, 3) or len(one.at) != 1:
-                raise ConfigError(f"{here}: to {one.to}: expected a whole {expected} and `at: [BODY]`")
+        _check_input(one, f"{where}: inputs: {one.name}")
     for signal in signals:
-        here = f"{where}: signals: {signal.name}"
-        if signal.quantity in OF_JOINTS and not signal.of:
-            raise ConfigError(f"{here}: of: missing; say which joints")
-        if signal.quantity in OF_JOINTS and signal.at and len(signal.at) != len(signal.of):
-            raise ConfigError(f"{here}: at: expected {len(signal.of)} joints, found {len(signal.at)}")
-        if signal.quantity not in OF_JOINTS and max(len(signal.of), len(signal.at)) > 1:
-            raise ConfigError(f"{here}: a {signal.quantity} is of one thing, found {list(signal.of or signal.at)}")
+        _check_signal(signal, f"{where}: signals: {signal.name}")
+
+
+def _check_input(one: InputSpec, here: str) -> None:
+    if not one.numbers:
+        raise ConfigError(f"{here}: of: missing; say which joints (or numbers) the {one.quantity} is of")
+    _known_numbers(one.of, one.quantity, here)
+    for what in ("delay_s", "scale", "offset"):
+        given = getattr(one, what)
+        if isinstance(given, tuple) and len(given) != len(one.numbers):
+            raise ConfigError(f"{here}: {what}: expected 1 or {len(one.numbers)} numbers, found {len(given)}")
+    if one.to in ("ctrl", "qfrc") and len(one.targets) != len(one.numbers):
+        raise ConfigError(
+            f"{here}: {len(one.numbers)} numbers ({', '.join(one.numbers)}) for {len(one.targets)} targets "
+            f"({', '.join(one.targets)})"
+        )
+    if one.measured and (one.to != "ctrl" or one.quantity not in PLACES or one.hold != "linear"):
+        raise ConfigError(f"{here}: measured: expected positions ({', '.join(PLACES)}), to ctrl, hold linear")
+    if one.to in ("mocap", "xfrc"):
+        expected = "pose" if one.to == "mocap" else "wrench"
+        size = _MOST_MOCAP if one.to == "mocap" else _MOST_WRENCH
+        if one.quantity not in (expected, "position") or len(one.numbers) not in (size, 3) or len(one.at) != 1:
+            raise ConfigError(f"{here}: to {one.to}: expected a whole {expected} and `at: [BODY]`")
+
+
+def _check_signal(signal: SignalSpec, here: str) -> None:
+    if signal.quantity in OF_JOINTS and not signal.of:
+        raise ConfigError(f"{here}: of: missing; say which joints")
+    if signal.quantity in OF_JOINTS and signal.at and len(signal.at) != len(signal.of):
+        raise ConfigError(f"{here}: at: expected {len(signal.of)} joints, found {len(signal.at)}")
+    if signal.quantity not in OF_JOINTS and max(len(signal.of), len(signal.at)) > 1:
+        raise ConfigError(f"{here}: a {signal.quantity} is of one thing, found {list(signal.of or signal.at)}")
 
 
 def _known_numbers(of: tuple[str, ...], quantity: Quantity, here: str) -> None:

@@ -70,11 +70,14 @@ class Level:
         return SIGMAS * np.maximum(self.noise, self.expected)
 
 
-def level(series: Sequence[Series], expected: float) -> Level:
-    """Noise and encoder of all recordings of one signal. `expected` [unit of the signal]: what the cell says of it."""
+def level(series: Sequence[Series], expected: float, stated: float = 0.0) -> Level:
+    """Noise and encoder of all recordings of one signal. `expected` [unit of the signal]: what the cell says of it.
+
+    `stated`: step of an encoder by its cell, for one too fine to be found in the recordings; 0: none.
+    """
     columns = [[one.value[:, c] for one in series] for c in range(series[0].value.shape[1])]
     least = LEAST_SHARE * expected
-    step = np.array([encoder_step(column, ROOT_12 * least) for column in columns])
+    step = np.array([encoder_step(column, ROOT_12 * least) or stated for column in columns])
     noise = np.array([difference_noise(column) for column in columns])
     return Level(np.maximum(noise, np.maximum(step / ROOT_12, least)), step, expected)
 

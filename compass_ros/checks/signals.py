@@ -34,6 +34,8 @@ class Part:
     """Noise [unit of the numbers]."""
     turns: bool = False
     """Whether it is an orientation."""
+    step: float = 0.0
+    """What the sensor counts in, as the cell says; 0: it says nothing."""
 
     @property
     def columns(self) -> slice:
@@ -67,7 +69,7 @@ def parts(signal: Signal, limits: Sequence[Limits], expected: float) -> Iterator
     if signal.jointed:
         for i, number in enumerate(signal.numbers):
             name = signal.name if signal.size == 1 else f"{signal.name}.{number}"
-            yield Part(name, i, 1, limits[i], noise)
+            yield Part(name, i, 1, limits[i], noise, step=signal.step or 0.0)
         return
     yield Part(signal.name, 0, min(signal.size, 3), limits[0], noise)
     if signal.quantity == "pose":
@@ -100,13 +102,13 @@ def unlooked(tracks: Mapping[str, Track], of: Sequence[Part]) -> LookedAt:
 
 def _unchecked(tracks: Mapping[str, Track], part: Part) -> Looked:
     series = tuple(_series(name, track, part) for name, track in tracks.items())
-    return Looked(part, series, level(series, part.expected), ())
+    return Looked(part, series, level(series, part.expected, part.step), ())
 
 
 def _checked(tracks: Mapping[str, Track], part: Part) -> Looked:
     raw = _unchecked(tracks, part)
     straight = unwrapped(raw.series, raw.level)
-    known = level(straight.series, part.expected)
+    known = level(straight.series, part.expected, part.step)
     if mixed := interleaved(straight.series, known):
         return replace(raw, findings=mixed)
     found = (*frozen(straight.series, known), *straight.findings)

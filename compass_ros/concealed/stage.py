@@ -32,6 +32,8 @@ NOTHING = 0.15
 """Share of the seeds that conceal wrong parameters alone."""
 WEAKEST, STRONGEST = 3e-3, 8e-3
 """What the best parameters leave of the effect, rms [m]; drawn uniform in the logarithm."""
+_SHARE = "pusher@actuation@vel_discount"
+"""What the arm makes of a commanded speed."""
 _STREAMS = ("kind", "parameters", "law")
 
 
@@ -65,6 +67,17 @@ class Stage:
         at = np.stack([np.interp(time_s, clock, column) for column in state.T], axis=1)
         poses = dynamics_of(self.cell).poses(self.secret.values[None], at[None])
         return {name: pose[0] for name, pose in poses.items()}
+
+    def told(self, action: Floats, time_s: Floats) -> Floats:
+        """(F, nu) speeds that the arm's controller is told for an (A,) action, at (F,) times since it [s]; before it 0.
+
+        As commanded: what share of them the arm reaches, and how late, is its secret.
+        """
+        values = np.where([p.name == _SHARE for p in self.cell.parameters], 1.0, self.secret.values)
+        steps = round(self.cell.duration / self.time_step)
+        controls = dynamics_of(self.cell).controls(values[None], action[None], steps)[0]
+        at = np.floor(time_s / self.time_step + 1e-9).astype(int)
+        return np.asarray(np.where(at[:, None] >= 0, controls[np.clip(at, 0, steps - 1)], 0.0))
 
 
 def draw(cell: Cell, inputs: Floats, seed: int, values: Floats | None = None, effect: str = "") -> Mapping[str, object]:

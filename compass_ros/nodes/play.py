@@ -18,6 +18,28 @@ from compass_ros.types import Floats
 
 STILL_S = 0.5
 """Still images before and after the motion."""
+TOOL = "pusher"
+"""What the arm moves."""
+AXES = (f"{TOOL}_x", f"{TOOL}_y")
+"""Its joints along the table and across it."""
+PER_IMAGE = 4
+"""Readings of the arm's encoders for each image."""
+
+
+@dataclass(frozen=True)
+class ArmSample:
+    """One moment of the arm."""
+
+    before_s: float
+    """Before the middle of the image that it belongs to [s]."""
+    tool: Floats
+    """(2,) x, y of the tool on the table, as the arm stands to it [m]."""
+    told: Floats
+    """(2,) what its controller is told, speeds along x and y [m/s]; nothing of what the arm makes of them."""
+
+    def counted(self, step_m: float) -> Floats:
+        """(2,) the tool's place as encoders say it that count in steps; of step 0 as it is."""
+        return np.asarray(np.round(self.tool / step_m) * step_m) if step_m else self.tool
 
 
 @dataclass(frozen=True)
@@ -28,6 +50,8 @@ class Play:
     """Name -> (F, sub_frames, 3) x, y [m], yaw [rad] at the moments of the exposures."""
     begin: int
     """Image in the middle of whose exposure the motion begins."""
+    arm: tuple[tuple[ArmSample, ...], ...] = ()
+    """For each image the readings since the one before, in the order of time."""
 
     @property
     def length(self) -> int:
@@ -38,6 +62,10 @@ class Play:
         """Name -> (sub_frames, 3); after the last image everything stays where it is."""
         index = min(image, self.length - 1)
         return {name: pose[index] for name, pose in self.moments.items()}
+
+    def of_arm(self, image: int) -> tuple[ArmSample, ...]:
+        """The arm's readings that belong to an image."""
+        return self.arm[min(image, self.length - 1)]
 
     def still(self, image: int) -> bool:
         """Whether nothing has moved since the image before."""
@@ -86,7 +114,7 @@ def action_of(cell: Cell, names: Sequence[str], values: Sequence[float]) -> Floa
     return action
 
 
-def resting(stage: Stage, scene: SceneConfig) -> Play:
+def resting(stage: Stage, scene: SceneConfig, readings: int = PER_IMAGE) -> Play:
     """One image of the cell before any shot. Raises ConfigError if the scene cannot show this cell."""
     middle = np.array([(field.low + field.high) / 2 for field in stage.cell.action])
     bodies = stage.bodies(middle, np.array([0.0, stage.time_step]))
@@ -96,15 +124,37 @@ def resting(stage: Stage, scene: SceneConfig) -> Play:
             f"the cell moves {sorted(bodies)}"
         )
     frames = scene.camera.sub_frames
-    return Play({name: np.repeat(bodies[name][:1], frames, axis=0)[None] for name in scene.discs}, 0)
+    still = {name: np.repeat(bodies[name][:1], frames, axis=0)[None] for name in scene.discs}
+    before = _before(readings, scene.camera.rate_hz)
+    tool = _on_table(stage, np.tile(bodies[TOOL][:1], (readings, 1)))
+    return Play(still, 0, (_samples(before, tool, np.zeros((readings, 2))),))
 
 
-def play(stage: Stage, scene: SceneConfig, action: Floats) -> Play:
-    """A shot (A,) with still images before and after it."""
+def play(stage: Stage, scene: SceneConfig, action: Floats, readings: int = PER_IMAGE) -> Play:
+    """A shot (A,) with still images before and after it; the arm's encoders are read so often for each image."""
     rate = scene.camera.rate_hz
     begin = round(STILL_S * rate)
     count = begin + round((stage.cell.duration + STILL_S) * rate)
     mid_s = (np.arange(count) - begin) / rate
     times = np.clip(exposure_times(scene.camera, mid_s), 0.0, stage.cell.duration)
-    flat = stage.bodies(action, times.ravel())
-    return Play({name: flat[name].reshape(*times.shape, 3) for name in scene.discs}, begin)
+    before = _before(readings, rate)
+    of_arm = (mid_s[:, None] - before).ravel()
+    flat = stage.bodies(action, np.concatenate([times.ravel(), np.clip(of_arm, 0.0, stage.cell.duration)]))
+    tool = _on_table(stage, flat[TOOL][times.size :]).reshape(count, readings, 2)
+    told = stage.told(action, of_arm).reshape(count, readings, 2)
+    arm = tuple(_samples(before, *of_image) for of_image in zip(tool, told, strict=True))
+    return Play({name: flat[name][: times.size].reshape(*times.shape, 3) for name in scene.discs}, begin, arm)
+
+
+def _before(readings: int, rate_hz: float) -> Floats:
+    """(n,) how long before an image each reading is [s]; the last one is in its middle."""
+    return np.asarray(np.arange(readings)[::-1] / (readings * rate_hz))
+
+
+def _on_table(stage: Stage, poses: Floats) -> Floats:
+    """(n, 2) where the tool is for the arm, which stands beside the table and knows nothing of the fiducials."""
+    return np.asarray(poses[:, :2] - table_shift(stage.cell, stage.secret.values))
+
+
+def _samples(before_s: Floats, tool: Floats, told: Floats) -> tuple[ArmSample, ...]:
+    return tuple(ArmSample(float(b), *of) for b, *of in zip(before_s, tool, told, strict=True))

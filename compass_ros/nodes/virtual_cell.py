@@ -1,11 +1,13 @@
 """Node `virtual_cell`: stands where a robot cell and its camera stand.
 
 It takes a shot command, plays it in a simulator of its own whose parameters nobody else knows, and in which physics may
-act that no other has, and publishes what a camera over the table and the arm's encoders would: images, camera_info and
-joint angles. True poses stay inside. The service `~/reveal` tells parameters and physics when a demonstration ends.
+act that no other has, and publishes what a camera over the table and the arm's driver would: images, camera_info, joint
+states, targets and the tool's pose. True poses stay inside. The service `~/reveal` tells parameters and physics when a
+demonstration ends.
 
 Image stamps are simulated sensor times (the middle of each exposure), exactly one period apart; they start at the
-clock's time and go on however long the drawing takes. The bias of the tracked positions is drawn as what it is in a
+clock's time and go on however long the drawing takes; the arm's encoders are read by the same clock, some times for
+each image. The bias of the tracked positions is drawn as what it is in a
 real cell: table, walls and obstacle stand shifted against the fiducials.
 """
 
@@ -19,23 +21,22 @@ from compass_ros_interfaces.msg import ShotCommand
 from numpy.typing import NDArray
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
-from sensor_msgs.msg import CameraInfo, Image, JointState
+from sensor_msgs.msg import CameraInfo, Image
 from std_srvs.srv import Trigger
 
 from compass_ros.cells import load
 from compass_ros.concealed.stage import Secret, Stage, read_secret
 from compass_ros.errors import CompassError, ConfigError
 from compass_ros.nodes import images
-from compass_ros.nodes.play import action_of, hidden_values, play, resting, table_shift
+from compass_ros.nodes.play import PER_IMAGE, action_of, hidden_values, play, resting, table_shift
 from compass_ros.nodes.qos import RELIABLE
 from compass_ros.nodes.run import run
-from compass_ros.tracking.arm import arm_pose
+from compass_ros.nodes.virtual_arm import VirtualArm
 from compass_ros.tracking.scene_config import SceneConfig, scene_config
 from compass_ros.tracking.tracker import use_one_core
 from compass_ros.tracking.virtual_camera import draw, expose, make_camera
 
 CAMERA_FRAME = "virtual_camera_optical_frame"
-JOINTS = ("shoulder", "elbow")
 
 
 class VirtualCell(Node):
@@ -51,7 +52,8 @@ class VirtualCell(Node):
         self._stage = Stage(self._cell, secret)
         self._scene = self._read_scene()
         self._camera = make_camera(self._scene, seed, table_shift(self._cell, secret.values))
-        self._rest = self._play = resting(self._stage, self._scene)
+        self._readings = int(self.get_parameter("readings").value)
+        self._rest = self._play = resting(self._stage, self._scene, self._readings)
         self._command: ShotCommand | None = None
         self._frame = str(self.get_parameter("frame").value)
         self._drawn: NDArray[np.uint8] | None = None
@@ -61,7 +63,7 @@ class VirtualCell(Node):
 
         self._images = self.create_publisher(Image, "image", RELIABLE)
         self._infos = self.create_publisher(CameraInfo, "camera_info", RELIABLE)
-        self._joints = self.create_publisher(JointState, "~/joint_states", RELIABLE)
+        self._arm = VirtualArm(self, self._frame, self._scene.arm, self.get_parameter("encoder_step_m").value)
         self._shots = self.create_publisher(ShotCommand, "~/shot", 10)
         self.create_subscription(ShotCommand, "~/command", self._on_command, 10)
         self.create_service(Trigger, "~/reveal", self._on_reveal)
@@ -86,7 +88,13 @@ class VirtualCell(Node):
         self.declare_parameter("noise", 2.5, describe("standard deviation of the sensor's noise [grey levels]"))
         self.declare_parameter("exposure_s", 0.004, describe("exposure of an image [s]"))
         self.declare_parameter("light", 0.30, describe("share of light that is missing in the darkest corner"))
-        self.declare_parameter("frame", "table", describe("frame of the values of a shot"))
+        self.declare_parameter("frame", "table", describe("frame of the values of a shot and of the tool's pose"))
+        often = [IntegerRange(from_value=1, to_value=16, step=1)]
+        readings = "how often the arm's encoders are read for each image"
+        self.declare_parameter("readings", PER_IMAGE, describe(readings, integer_range=often))
+        steps = [FloatingPointRange(from_value=0.0, to_value=0.01)]
+        counts = "what the encoders of the tool's axes count in [m]"
+        self.declare_parameter("encoder_step_m", 1e-5, describe(counts, floating_point_range=steps))
         self.declare_parameter("arm", True, describe("draw the arm that holds the pusher"))
 
     def _read_scene(self) -> SceneConfig:
@@ -106,7 +114,7 @@ class VirtualCell(Node):
         except CompassError as error:
             self.get_logger().error(str(error))
             return
-        self._play = play(self._stage, self._scene, action)
+        self._play = play(self._stage, self._scene, action, self._readings)
         self._command, self._image_of_play = command, 0
 
     def _on_time(self) -> None:
@@ -119,10 +127,7 @@ class VirtualCell(Node):
         picture = expose(self._camera, self._drawn, self._images_taken)
         self._images.publish(images.image_message(picture, head))
         self._infos.publish(images.camera_info_message(self._camera.scene.view.camera, head))
-        if self._scene.arm is not None:
-            angles = arm_pose(self._scene.arm, poses[self._scene.arm.holds][:, :2].mean(axis=0)).joints
-            joints = dict(zip(JOINTS, angles.tolist(), strict=True))
-            self._joints.publish(images.joint_message(joints, images.header(now_ns, "")))
+        self._arm.publish(self._play.of_arm(self._image_of_play), now_ns)
         self._announce(now_ns)
         self._images_taken += 1
         self._image_of_play += 1

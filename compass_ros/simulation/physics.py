@@ -114,6 +114,7 @@ class Physics:
         start[:, 1 : 1 + nq], start[:, 1 + nq : 1 + nq + nv] = self.dynamics.start(
             self.of_cell(values), self.of_command(inputs)
         )
+        self.drives.begin(start[:, 1 : 1 + nq], self.of_cell(values), self.of_command(inputs), self.bank)
         for joint, rotor in rotors(self.model):  # in the middle of its play
             for first, places in ((1, self.model.jnt_qposadr), (1 + nq, self.model.jnt_dofadr)):
                 start[:, first + places[rotor]] = start[:, first + places[joint]]
@@ -188,10 +189,10 @@ def signal_kind(signal: Signal) -> SiteKind:
     return "camera" if signal.places else "sensor"
 
 
-def places_of(cell: Cell, dynamics: Dynamics) -> Places:
+def places_of(cell: Cell, dynamics: Dynamics, drives: Drives) -> Places:
     """The sites of a cell's scene."""
     sliding = frozenset(s.body for s in dynamics.sliding(cell.defaults[None]))
-    return Places(dynamics.model, sliding, tuple(_measured(cell, dynamics.model)))
+    return Places(dynamics.model, sliding, tuple(_measured(cell, dynamics.model)), drives.commanded)
 
 
 def _measured(cell: Cell, model: mujoco.MjModel) -> Iterator[Site]:

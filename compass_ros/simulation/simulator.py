@@ -64,7 +64,7 @@ class Simulator:
         for name, value in self._options.items():
             setattr(dynamics.model.opt, name, value)
         drives = Drives(cell, dynamics.model)
-        self.physics = Physics(cell, dynamics, places_of(cell, dynamics), (), drives)
+        self.physics = Physics(cell, dynamics, places_of(cell, dynamics, drives), (), drives)
         self._players: dict[tuple[str, ...], Player] = {(): Player(dynamics.model, threads)}
         self.physics = self._taking(effects)
 

@@ -103,6 +103,8 @@ class Places:
     """Bodies whose friction on a table is the cell's, no part of the scene."""
     signals: tuple[Site, ...] = ()
     """What is measured of it: each signal, and each number of those that have several."""
+    commanded: frozenset[int] | None = None
+    """Actuators that are told what to do; one that follows a measured path is no drive. None: all."""
 
     def sites(self, objects: Sequence[str], kinds: Collection[SiteKind]) -> tuple[Site, ...]:
         """Those of these kinds that the names stand for; without names all drives, all contacts or all signals."""
@@ -201,7 +203,8 @@ class Places:
     @cached_property
     def drives(self) -> tuple[Site, ...]:
         """Actuators by what they are told; those that move one tool together."""
-        single = [Site(drive_kind(self.model, i), (self.model.actuator(i).name,), (i,)) for i in range(self.model.nu)]
+        told = range(self.model.nu) if self.commanded is None else sorted(self.commanded)
+        single = [Site(drive_kind(self.model, i), (self.model.actuator(i).name,), (i,)) for i in told]
         tools = [tool for body in range(1, self.model.nbody) if (tool := self._tool(body, single))]
         taken = {i for tool in tools for i in tool.actuators}
         alone = [d for d in single if d.actuators[0] not in taken]
