@@ -100,7 +100,8 @@ def units_of(model: mujoco.MjModel, signal: Signal, where: str) -> tuple[str, ..
 
 
 def _simple(model: mujoco.MjModel, joint: str, here: str) -> bool:
-    """True; raises ConfigError for a joint that has no one angle."""
+    """True; raises ConfigError for a joint that the scene lacks, or that has no one angle."""
+    rows(model, "qpos", joint, here)
     if int(model.joint(joint).type[0]) not in (_JOINT.mjJNT_HINGE, _JOINT.mjJNT_SLIDE):
         raise ConfigError(
             f"{here}: '{joint}' is a ball or free joint, expected a hinge or slide; track its body's pose"

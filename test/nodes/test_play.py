@@ -87,6 +87,37 @@ def test_a_play_is_still_then_moves_then_is_still(cell: Cell) -> None:
     np.testing.assert_allclose(shown.poses(shown.begin + 60)["puck2"].mean(axis=0), truth, atol=1e-5)
 
 
+def test_the_arm_says_where_its_tool_is_and_what_it_was_told(cell: Cell) -> None:
+    """Beside the simulator's own motion, in the frame of the table and not in that of the shifted camera."""
+    hidden = {"env@camera@bias_x": 0.03, "env@camera@bias_y": -0.02, "pusher@actuation@vel_discount": 0.85}
+    values = cell.values(hidden)
+    action = action_of(cell, NAMES, [-0.22, 0.07, 0.0, 0.4])
+    shown = play(Stage(cell, Secret(values)), SCENE, action)
+    samples = [s for image in range(shown.length) for s in shown.of_arm(image)]
+    image = np.repeat(np.arange(shown.length), 4)
+    time = (image - shown.begin) / 60 - np.array([s.before_s for s in samples])
+    np.testing.assert_allclose(np.diff(time), 1 / 240, rtol=1e-9)
+    before = time < 0
+    tool, told = (np.array([getattr(s, what) for s in samples]) for what in ("tool", "told"))
+    np.testing.assert_allclose(tool[before], [[-0.22, 0.07]] * before.sum(), atol=1e-12)
+    truth = Simulator(cell, threads=1).bodies(values, action, np.clip(time, 0, 2.5))["pusher"][:, :2]
+    np.testing.assert_allclose(tool, truth - [0.03, -0.02], atol=1e-12)
+    assert not told[before].any()
+    push = (time > 0.06) & (time < 0.2)
+    np.testing.assert_allclose(np.linalg.norm(told[push], axis=1), 0.4, rtol=1e-9, err_msg="as commanded")
+    reached = np.linalg.norm(np.diff(tool[push], axis=0), axis=1) * 240
+    assert np.median(reached) == pytest.approx(0.85 * 0.4, rel=0.01)
+
+
+@pytest.mark.parametrize("step", [1e-6, 1e-5, 1e-4, 1e-3, 0.0])
+def test_encoders_count(cell: Cell, step: float) -> None:
+    (sample,) = resting(Stage(cell, Secret(cell.defaults)), SCENE, 1).of_arm(7)
+    counted = sample.counted(step)
+    assert np.abs(counted - sample.tool).max() <= step / 2 + 1e-15
+    if step:
+        np.testing.assert_allclose(counted / step, np.round(counted / step), atol=1e-6)
+
+
 def test_a_cell_that_the_scene_does_not_show_is_refused(cell: Cell) -> None:
     scene = SceneConfig(discs={"cube": DiscConfig(colour=(1, 2, 3))}, arm=None)
     with pytest.raises(ConfigError, match=r"shows \['cube'\], the cell moves \['puck1', 'puck2', 'pusher'\]"):
