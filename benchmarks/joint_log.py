@@ -151,7 +151,7 @@ def recording(seconds: float, buffer_s: int, best_effort: bool, folder: Path) ->
             count = round(seconds * RATE_HZ)
             before, before_mb = used_s(process.pid), memory_mb(process.pid, "VmRSS")
             latest = published(publish, count, halfway)
-            time.sleep(2.0)
+            time.sleep(1.0)
             used = used_s(process.pid) - before
             rclpy.spin_until_future_complete(node, waiting[0])
             after_mb, most_mb = memory_mb(process.pid, "VmRSS"), memory_mb(process.pid, "VmHWM")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -17,6 +18,10 @@ from compass_ros.errors import BagError
 BESIDE_DATA = 256
 """What Python holds beside the data of a message [bytes]: the head of its bytes (33), a tuple of five (80), three
 numbers (32 each), a place in the queue (8), rounded up by the allocator; a test measures it."""
+
+
+STEP_MESSAGES, STEP_BYTES = 200, 2**20
+"""What is written in one step: some milliseconds, in which a recorder that goes on receiving is not missed."""
 
 
 class Kept(NamedTuple):
@@ -118,20 +123,30 @@ class Past:
     connections: tuple[Connection, ...]
 
     def write(self, folder: Path, cell: str, cell_hash: str) -> EpisodeHeader:
-        """Write an ordinary bag and say what is in it. Raises BagError: it exists, or the disk refuses.
+        """As `writing`, in one go."""
+        steps = self.writing(folder, cell, cell_hash)
+        while True:
+            try:
+                next(steps)
+            except StopIteration as end:
+                said: EpisodeHeader = end.value
+                return said
+
+    def writing(self, folder: Path, cell: str, cell_hash: str) -> Generator[None, None, EpisodeHeader]:
+        """Write an ordinary bag in steps and say what is in it. Raises BagError: it exists, or the disk refuses.
 
         A bag that could not be written whole is deleted: the operator asks again.
         """
         writer = BagWriter(folder)
         try:
-            said = self._written(writer, cell, cell_hash)
+            said = yield from self._written(writer, cell, cell_hash)
             writer.close()
         except BagError:
             writer.delete()
             raise
         return replace(said, bag=str(folder))
 
-    def _written(self, writer: BagWriter, cell: str, cell_hash: str) -> EpisodeHeader:
+    def _written(self, writer: BagWriter, cell: str, cell_hash: str) -> Generator[None, None, EpisodeHeader]:
         start_ns = self.messages[0].log_ns
         topics = tuple(connection.topic for connection in self.connections)
         first = EpisodeHeader("recording", writer.folder.name, cell, cell_hash, start_ns, topics=topics)
@@ -141,8 +156,13 @@ class Past:
         for one in self.standing:
             _write(writer, one._replace(log_ns=start_ns))
         writer.write(headers, start_ns, start_ns, header_bytes(first))
-        for one in self.messages:
+        size = 0
+        for number, one in enumerate(self.messages, 1):
             _write(writer, one)
+            size += len(one.data)
+            if number % STEP_MESSAGES == 0 or size >= STEP_BYTES:
+                size = 0
+                yield
         last = replace(
             first,
             state="finished",
