@@ -79,11 +79,11 @@ def test_parameters_of_effects_follow_those_of_the_cell() -> None:
 @pytest.mark.parametrize(
     ("effect", "objects", "says"),
     [
-        ("magnus", ("puck3",), "no body that slides in a plane 'puck3'.*did you mean 'puck"),
+        ("magnus", ("puck3",), "no body that slides in a plane or moving body 'puck3'.*did you mean 'puck"),
         ("magnus", (), "acts on at least one object"),
         ("local_wall", ("rigt_wall",), "did you mean 'right_wall'"),
         ("local_wall", ("left_wall", "right_wall"), "acts on one wall"),
-        ("camera_scale", ("puck1",), "no tracked body 'puck1'"),
+        ("camera_scale", ("pusher",), "no tracked body 'pusher'"),
     ],
 )
 def test_an_effect_that_cannot_act_is_refused(effect: str, objects: tuple[str, ...], says: str) -> None:

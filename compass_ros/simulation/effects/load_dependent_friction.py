@@ -2,7 +2,7 @@
 
 F = -coefficient L v / |v|, L = |qfrc_actuator + qfrc_applied| of the joint: what drives it, as the gear sees it from
 the motor's side (gravity, acceleration and contacts count as far as the drive answers them). Nothing on a joint that
-nothing drives.
+nothing drives, nor beside an elasticity or a play, where the drive loads the motor's side.
 Source: Hamon, Gautier and Garrec 2010, friction of a transmission that depends on load and speed, its term in the load.
 """
 
