@@ -12,12 +12,12 @@ import numpy as np
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
 
 from compass_ros.nodes import images
 from compass_ros.nodes.play import AXES, ArmSample
-from compass_ros.nodes.qos import RELIABLE
 from compass_ros.tracking.arm import arm_pose
 from compass_ros.tracking.frames import Place
 from compass_ros.tracking.scene_config import ArmConfig
@@ -25,6 +25,8 @@ from compass_ros.types import Floats
 
 LINKS = ("shoulder", "elbow")
 TOOL_FRAME = "tool"
+_QOS = QoSProfile(depth=1000)
+"""Reliable; several seconds of readings wait for a subscriber that is held up. They come some at a time."""
 
 
 class VirtualArm:
@@ -33,10 +35,10 @@ class VirtualArm:
     def __init__(self, node: Node, table: str, drawn: ArmConfig | None, step_m: float) -> None:
         """`table`: frame of the table; `step_m`: what the encoders of the tool's axes count in."""
         self._table, self._drawn, self._step = table, drawn, step_m
-        self._states = node.create_publisher(JointState, "~/joint_states", RELIABLE)
-        self._commands = node.create_publisher(JointState, "~/joint_commands", RELIABLE)
-        self._poses = node.create_publisher(PoseStamped, "~/tool_pose", RELIABLE)
-        self._frames = node.create_publisher(TFMessage, "/tf", RELIABLE)
+        self._states = node.create_publisher(JointState, "~/joint_states", _QOS)
+        self._commands = node.create_publisher(JointState, "~/joint_commands", _QOS)
+        self._poses = node.create_publisher(PoseStamped, "~/tool_pose", _QOS)
+        self._frames = node.create_publisher(TFMessage, "/tf", _QOS)
 
     def publish(self, samples: Sequence[ArmSample], end_ns: int) -> None:
         """Samples in the order of their time before the stamp `end_ns`."""
