@@ -201,6 +201,14 @@ class Places:
         return tuple(model.geom(g).name for g in sorted(fixed) if model.geom(g).name)
 
     @cached_property
+    def ends(self) -> tuple[str, ...]:
+        """Bodies with joints that carry no other such body: the last link of an arm, each finger, a free body."""
+        model = self.model
+        jointed = [body for body in range(1, model.nbody) if model.body_jntnum[body]]
+        carrying = {int(model.body_weldid[model.body_parentid[body]]) for body in jointed}
+        return tuple(model.body(body).name for body in jointed if body not in carrying and model.body(body).name)
+
+    @cached_property
     def drives(self) -> tuple[Site, ...]:
         """Actuators by what they are told; those that move one tool together."""
         told = range(self.model.nu) if self.commanded is None else sorted(self.commanded)

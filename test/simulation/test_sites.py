@@ -85,6 +85,24 @@ RAIL = body("cart", '<joint name="rail" type="slide" axis="1 0 0"/>')
 ARM = body("arm", '<joint name="axis" type="hinge" axis="0 1 0"/>', 'pos="0 0 1"')
 
 
+FINGERS = body("f1", "<joint/>", 'pos="1 0 0"') + body("f2", "<joint/>", 'pos="-1 0 0"') + body("plate", "")
+
+
+@pytest.mark.parametrize(
+    ("inside", "ends"),
+    [
+        (ARM, ("arm",)),
+        (body("upper", "<joint/>", inside=body("lower", "<joint/>", 'pos="1 0 0"')), ("lower",)),
+        (body("upper", "<joint/>", inside=body("flange", "", inside=body("tool", "", 'pos="1 0 0"'))), ("upper",)),
+        (body("upper", "<joint/>", inside=body("flange", "", inside=FINGERS)), ("f1", "f2")),
+        (body("stand", "", inside=ARM) + body("ball", "<freejoint/>"), ("arm", "ball")),
+        (body("stand", ""), ()),
+    ],
+)
+def test_a_payload_belongs_on_what_carries_no_other_link(inside: str, ends: tuple[str, ...]) -> None:
+    assert places(inside).ends == ends
+
+
 @pytest.mark.parametrize(
     ("actuator", "kind"),
     [
