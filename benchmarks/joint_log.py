@@ -198,7 +198,7 @@ def calibrating(seconds: float, folder: Path, bag: Path | None, discover: bool) 
     begun = time.perf_counter()
     subprocess.run(words, check=True)
     took = time.perf_counter() - begun
-    most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
     result = read_result(folder / "out" / "result.json")
     gap = result["gap"]["calibrated"]["fit"]["signals"]["joints"]
     cell = load("kinova3")
@@ -206,7 +206,8 @@ def calibrating(seconds: float, folder: Path, bag: Path | None, discover: bool) 
     rows = {row["name"]: row for row in result["parameters"]}
     off = [abs(rows[p.name]["value"] - t) / rows[p.name]["std"] for p, t in zip(cell.parameters, truth, strict=True)]
     print(
-        f"calibrate: {took:.0f} s, {most:.0f} MB at most; {len(result['episodes']['used'])} windows; "
+        f"calibrate: {took:.0f} s, {used.ru_utime + used.ru_stime:.0f} s of processors, {used.ru_maxrss / 1024:.0f} MB "
+        f"at most; {len(result['episodes']['used'])} windows; "
         f"{1e3 * gap['rms']:.3f} mrad, {gap['rms'] / gap['floor']:.3f} of the floor; "
         f"90 % intervals hold {100 * np.mean(np.array(off) < 1.645):.0f} %"
     )
