@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from compass_ros.cells import Cell
-from compass_ros.cells.drives import Drive, Drives
+from compass_ros.cells.drives import Drive, Drives, span
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.cells.sensors import units_of
 from compass_ros.cells.signals import Signal
@@ -383,7 +383,9 @@ class Simulator:
         if self.physics.model.nsensordata:
             rows = np.concatenate([start[:, None], states[:, :-1]], axis=1)
             return np.asarray(np.concatenate([rows, sensors], axis=2)[:, :, 1 + columns])
-        return np.concatenate([start[:, None, 1 + columns], states[:, :, 1 + columns]], axis=1)
+        seen = np.empty((len(start), steps + 1, len(columns)))
+        seen[:, 0], seen[:, 1:] = start[:, 1 + columns], states[:, :, span(1 + columns)]
+        return seen
 
     def _steps(self, duration: float) -> int:
         steps = max(int(np.ceil(duration / self.time_step)), 1)
