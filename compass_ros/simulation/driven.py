@@ -74,6 +74,8 @@ def driven_joints(simulator: Simulator) -> Driven:
         said = ", ".join(f"{i.name} ({i.quantity} to {i.to})" for i in inputs) or "none"
         raise ConfigError(f"{cell.path}: inputs: expected one of joint positions, velocities or efforts, found {said}")
     spec = inputs[0]
+    if spec.measured:
+        raise ConfigError(f"{cell.path}: inputs: {spec.name}: it was measured, and nobody can play it")
     actuators = [model.actuator(name).id for name in spec.targets] if spec.to == "ctrl" else []
     if any(int(model.actuator_trntype[a]) not in _JOINTS for a in actuators):
         raise ConfigError(f"{cell.path}: inputs: {spec.name}: its actuators do not act on single joints")
