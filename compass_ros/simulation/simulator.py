@@ -270,6 +270,21 @@ class Simulator:
                 out[name] += evaluate(term, states[:, :, attached.objects.index(name)], gravity)
         return out
 
+    def play(
+        self, values: Floats, start: Floats, controls: Floats | None, steps: int
+    ) -> tuple[Floats, Floats]:
+        """(B, T, s) full states and (B, T, nsensordata) sensors after each of T steps from (B, s) states."""
+        return self._player.play(self.physics, values, start, controls, steps)
+
+    def written(self, values: Floats) -> mujoco.MjModel:
+        """The scene at (P,) values; it holds until the next rollout and is not to be changed."""
+        return self._player.written(self.physics, values[None])[0]
+
+    def begun(self, values: Floats, inputs: Floats, time_s: Floats) -> tuple[Floats, Floats | None, int]:
+        """(B, s) states at the start, (B, T, n) what drives MuJoCo, and T, for what is asked at (B, F) times [s]."""
+        steps = self._steps(self.physics.duration(values, inputs, time_s))
+        return self.physics.start(values, inputs), self.physics.controls(values, inputs, steps), steps
+
     def motion(self, values: Floats, inputs: Floats, duration: float) -> Motion:
         """Roll out (B, P) values with (B, A) inputs for `duration` seconds."""
         parts = [

@@ -1,0 +1,68 @@
+"""The discrepancy: a Gaussian process over generalised forces and over signals, for itself in each episode.
+
+delta_s(t) ~ GP(0, size_s^2 exp(-(t - t')^2 / (2 MEMORY_S^2))): an acceleration in each direction s of what is tracked,
+or an error of each signal s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from compass_ros.discovery.evidence import evidences, log_sum
+from compass_ros.discovery.response import Response
+from compass_ros.discovery.settings import FREE, MEMORY_S, RHO, RHO_PRIOR
+from compass_ros.types import Floats
+
+_KEPT = 1e-3
+"""Least variance of a component of the process that is kept, as a share of the largest."""
+
+
+def spread(response: Response, sizes: Floats) -> Floats | None:
+    """(K S, q) square root of the covariance for (S,) sizes of the discrepancy; None where all are zero."""
+    moments = response.kicks.moments_s
+    kernel = np.exp(-0.5 * ((moments[:, None] - moments) / MEMORY_S) ** 2)
+    variance, axes = np.linalg.eigh(kernel)
+    kept = variance > _KEPT * variance[-1]
+    root = axes[:, kept] * np.sqrt(variance[kept])
+    on = np.flatnonzero(sizes > 0)
+    if not len(on):
+        return None
+    out = np.zeros((len(moments), len(sizes), len(on), root.shape[1]))
+    for i, s in enumerate(on):
+        out[:, s, i] = sizes[s] * root
+    return out.reshape(len(moments) * len(sizes), -1)
+
+
+@dataclass(frozen=True, eq=False)
+class Free:
+    """A model as it is, and with a discrepancy of any size."""
+
+    alone: float
+    """Log evidence of the model as it is."""
+    log: float
+    """Of the same with a free discrepancy, of forces or of signals."""
+    of_forces: bool
+    """Which of the two has the higher evidence."""
+    mean: Floats
+    """(E, K, S) posterior mean of the discrepancy at its most probable size."""
+
+
+def free(response: Response) -> Free:
+    """The model of a response with a discrepancy of any size, of forces or of signals."""
+    kinds = [response.unit * response.forces, response.unit * (1 - response.forces)]
+    sizes = [s * kind for kind in kinds for s in FREE]
+    alone, *found = evidences(response.tangent, [None, *(spread(response, s) for s in sizes)])
+    logs = np.array([f.log for f in found])
+    best = int(np.argmax(logs))
+    shape = (len(response.tangent.residual), len(response.kicks.moments_s), len(response.unit))
+    return Free(
+        alone.log, log_sum(logs - np.log(len(logs))), best < len(FREE), found[best].pushes.reshape(shape)
+    )
+
+
+def with_law(response: Response, sizes: Floats) -> float:
+    """Log evidence of a model with laws; (S,) rms sizes of the laws along the fitted motion."""
+    found = evidences(response.tangent, [spread(response, rho * sizes) for rho in RHO])
+    return log_sum(np.array([f.log for f in found]) + np.log(RHO_PRIOR))

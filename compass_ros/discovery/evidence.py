@@ -1,0 +1,194 @@
+"""Log marginal likelihood of a model: its parameters by Laplace's approximation, a discrepancy integrated out.
+
+With r the residual at the fit, J its derivatives by the p parameters x (each in standard deviations of its prior), L
+those by an episode's own numbers l (its launch, or the first state of a window) and R those by pushes d (generalised
+forces, hats in time), all in sigma of the noise and linear about the fit,
+
+    -2 log Z = |r + J x + L l + R d|^2 / kappa + |x - a|^2 + |l - b|^2 + d' K^-1 d   integrated over x, l and d,
+
+where kappa is the correlation time of the noise in frames, a and b are where the priors have their means, and K is the
+covariance of the discrepancy. Source: MacKay 1992 (evidence); Kennedy and O'Hagan 2001 (discrepancy); the elimination
+of an episode's own numbers is the Schur complement.
+
+A robust loss rho is bounded from above by w r^2 + c, with weights w and constant c taken at any residuals (rho is
+concave in r^2): for each such choice the formula gives a lower bound of the log evidence, and the largest is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from compass_ros.calibration.least_squares import robust_loss, robust_weight
+from compass_ros.types import Floats
+
+ROUNDS = 2
+"""How often weights are taken anew where residuals are beyond the scale of the robust loss."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """A fitted model, linear about its fit. E episodes, D residuals of each; 0 where nothing was measured."""
+
+    residual: Floats
+    """(E, D) [sigma]"""
+    parameters: Floats
+    """(E, D, p) by each parameter, in standard deviations of its prior."""
+    own: Floats
+    """(E, D, l) by the episode's own numbers, in theirs."""
+    pushes: Floats
+    """(E, D, H) by pushes."""
+    away: Floats
+    """(p,) from the fit to the prior's mean, in its standard deviations."""
+    own_away: Floats
+    """(E, l) the same of the episode's own numbers."""
+    robust: float
+    """Scale of the robust loss [sigma]."""
+    correlation_time: float
+    """Frames that one independent measurement is worth."""
+
+    def more(self, columns: Floats, away: Floats) -> Tangent:
+        """The same with (E, D, n) more parameters whose priors have their means (n,) away."""
+        return Tangent(
+            self.residual,
+            np.concatenate([self.parameters, columns], axis=2),
+            self.own,
+            self.pushes,
+            np.concatenate([self.away, away]),
+            self.own_away,
+            self.robust,
+            self.correlation_time,
+        )
+
+    @cached_property
+    def normal(self) -> Normal:
+        """Its normal equations with the weights of the residual itself."""
+        return Normal.of(self, self.residual)
+
+
+@dataclass(frozen=True, eq=False)
+class Normal:
+    """Products of all columns, weighted, of each episode: what every size of a discrepancy is judged from."""
+
+    gram: Floats
+    """(E, n, n) of parameters, own numbers, pushes and the residual, in this order, over kappa."""
+    constant: float
+    """What the bound of the robust loss adds, over kappa."""
+
+    @staticmethod
+    def of(tangent: Tangent, residual: Floats) -> Normal:
+        """With weights taken at (E, D) residuals."""
+        weight = robust_weight(residual, tangent.robust)
+        columns = np.concatenate(
+            [tangent.parameters, tangent.own, tangent.pushes, tangent.residual[:, :, None]], axis=2
+        )
+        weighted = columns * weight[:, :, None]
+        gram = np.stack([a.T @ b for a, b in zip(weighted, columns, strict=True)])
+        constant = float(np.sum(robust_loss(residual, tangent.robust) - weight * residual**2))
+        return Normal(gram / tangent.correlation_time, constant / tangent.correlation_time)
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Log evidence and where its maximum lies."""
+
+    log: float
+    parameters: Floats
+    """(p,) change of the parameters, in standard deviations of the prior."""
+    own: Floats
+    """(E, l)"""
+    pushes: Floats
+    """(E, H) posterior mean of the discrepancy."""
+    precision: Floats
+    """(p, p) of the parameters, everything else integrated out."""
+
+
+class Factored:
+    """Parameters, own numbers and a discrepancy factored, for any residuals.
+
+    The discrepancy is `spread` z, z standard normal: (H, q), or (E, H, q) where episodes differ; None: without.
+    """
+
+    def __init__(self, tangent: Tangent, normal: Normal, spread: Floats | None) -> None:
+        gram = normal.gram
+        episodes, p, l = len(gram), tangent.parameters.shape[2], tangent.own.shape[2]
+        pushes = tangent.pushes.shape[2]
+        mixed = np.zeros((pushes, 0)) if spread is None else spread
+        self._mixed = np.broadcast_to(mixed, (episodes, *mixed.shape[-2:]))
+        self._turned = self._mixed.transpose(0, 2, 1)
+        self._own, self._pushes = slice(p, p + l), slice(p + l, p + l + pushes)
+        self._p, self._l, self._tangent, self._constant = p, l, tangent, normal.constant
+        own, hats, q = self._own, self._pushes, self._mixed.shape[2]
+        inner = np.empty((episodes, l + q, l + q))
+        inner[:, :l, :l] = gram[:, own, own]
+        inner[:, :l, l:] = gram[:, own, hats] @ self._mixed
+        inner[:, l:, :l] = inner[:, :l, l:].transpose(0, 2, 1)
+        inner[:, l:, l:] = self._turned @ gram[:, hats, hats] @ self._mixed
+        self._factor = np.linalg.cholesky(inner + np.eye(l + q))
+        across = np.concatenate([gram[:, own, :p], self._turned @ gram[:, hats, :p]], axis=1)
+        self._half = np.linalg.solve(self._factor, across)
+        taken = np.einsum("eij,eik->jk", self._half, self._half)
+        self.precision = gram[:, :p, :p].sum(axis=0) - taken + np.eye(p)
+        self._outer = np.linalg.cholesky(self.precision)
+        self._determinant = sum(
+            float(np.log(np.diagonal(f, axis1=-2, axis2=-1)).sum()) for f in (self._factor, self._outer)
+        )
+
+    def _steps(self, last: Floats, squares: Floats) -> tuple[Floats, Floats, Floats]:
+        """(m,) logs, (p, m) steps and (E, l + q, m) halves for (E, n, m) products of the columns with residuals."""
+        tangent = self._tangent
+        with_own = last[:, self._own] - tangent.own_away[:, :, None]
+        half = np.linalg.solve(
+            self._factor, np.concatenate([with_own, self._turned @ last[:, self._pushes]], axis=1)
+        )
+        pull = last[:, : self._p].sum(axis=0) - np.einsum("eip,eim->pm", self._half, half)
+        pull -= tangent.away[:, None]
+        step = -np.linalg.solve(self._outer.T, np.linalg.solve(self._outer, pull))
+        square = squares + np.sum(tangent.own_away**2) + np.sum(tangent.away**2)
+        square = square - np.sum(half**2, axis=(0, 1)) + np.sum(pull * step, axis=0)
+        return -0.5 * (square + self._constant) - self._determinant, step, half
+
+    def logs(self, last: Floats, squares: Floats) -> Floats:
+        """(m,) log evidences of m residuals: (E, n, m) products of all columns with them, (m,) their squares."""
+        return self._steps(last, squares)[0]
+
+    def solved(self, normal: Normal) -> Solved:
+        """Of the residual of a tangent."""
+        last = normal.gram[:, :-1, -1:]
+        logs, step, half = self._steps(last, normal.gram[:, -1, -1].sum(keepdims=True))
+        within = -np.linalg.solve(self._factor.transpose(0, 2, 1), self._half @ step + half)
+        push = self._mixed @ within[:, self._l :]
+        return Solved(float(logs[0]), step[:, 0], within[:, : self._l, 0], push[..., 0], self.precision)
+
+
+def solve(tangent: Tangent, normal: Normal, spread: Floats | None) -> Solved:
+    """Log evidence with a discrepancy, as `Factored` has it."""
+    return Factored(tangent, normal, spread).solved(normal)
+
+
+def residual_of(tangent: Tangent, solved: Solved) -> Floats:
+    """(E, D) what is left where everything is at its maximum."""
+    left = tangent.residual + tangent.parameters @ solved.parameters
+    left += (tangent.own @ solved.own[:, :, None])[..., 0] + (tangent.pushes @ solved.pushes[:, :, None])[..., 0]
+    return np.asarray(left)
+
+
+def evidences(tangent: Tangent, spreads: list[Floats | None]) -> list[Solved]:
+    """Of several discrepancies, each with the weights of the residuals that the best of them leaves."""
+    found = [solve(tangent, tangent.normal, spread) for spread in spreads]
+    beyond = tangent.residual**2 > tangent.robust**2
+    for _ in range(ROUNDS if beyond.any() else 0):
+        best = max(found, key=lambda s: s.log)
+        normal = Normal.of(tangent, residual_of(tangent, best))
+        again = [solve(tangent, normal, spread) for spread in spreads]
+        if max(s.log for s in again) < best.log + 0.1:
+            break
+        found = [max(pair, key=lambda s: s.log) for pair in zip(found, again, strict=True)]
+    return found
+
+
+def log_sum(logs: Floats) -> float:
+    """Logarithm of a sum of exponentials."""
+    return float(np.logaddexp.reduce(logs))

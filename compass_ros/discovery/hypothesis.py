@@ -1,0 +1,200 @@
+"""A model with laws, fitted together with all parameters: from its parent's fit, or from the cell's first guess."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from compass_ros.calibration.least_squares import Fit, Linear, Point, cost, inward, minimise
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.refine import freed, growing, settled
+from compass_ros.discovery.discrepancy import Free, free, spread, with_law
+from compass_ros.discovery.evidence import solve
+from compass_ros.discovery.first_order import WIDTH, Ranked
+from compass_ros.discovery.response import Response, respond
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import Attached
+from compass_ros.types import Floats, Ints
+
+_SHARES = (0.15, 0.4, 0.7, 1.0)
+"""Parts of the first-order step from which a fit begins, the best of them."""
+_STEP = 0.02
+"""Finite differences of a new law's numbers, in standard deviations of their priors."""
+_SLIGHT = 0.3
+"""Gain [log likelihood] of a step that is the last one: models are compared by whole units."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A set of laws on sites, with its fit."""
+
+    laws: tuple[Attached, ...]
+    simulator: Simulator
+    likelihood: Likelihood
+    fit: Fit
+    near: Response | None = None
+    """The response of a fit nearby, whose pushes are taken for this one's; None: they are taken at this fit."""
+
+    @property
+    def name(self) -> str:
+        return " + ".join(sorted(f"{a.effect.name}({', '.join(a.objects)})" for a in self.laws)) or "none"
+
+    @property
+    def chi_square(self) -> float:
+        return 2 * self.fit.point.cost / self.likelihood.measurements
+
+    @cached_property
+    def response(self) -> Response:
+        if self.near is None:
+            return respond(self.simulator, self.likelihood, self.fit)
+        return replace(self.near, simulator=self.simulator, likelihood=self.likelihood, fit=self.fit)
+
+    @cached_property
+    def sizes(self) -> Floats:
+        """(S,) rms of its laws along the fitted motion: accelerations, and errors of signals.
+
+        What acts on contacts or commands counts as a push that moves the recordings as much as it does.
+        """
+        response, squared = self.response, np.zeros(len(self.response.unit))
+        at = len(self.simulator.cell.parameters)
+        for attached in self.laws:
+            own = slice(at, at + len(attached.effect.quantities))
+            at = own.stop
+            if attached.effect.forces is not None and attached.effect.moves:
+                pushed = response.accelerations(attached, self.fit.point.values[own])
+                squared += np.mean(pushed**2, axis=(0, 1))
+                continue
+            moved = self._moved(own, attached)
+            if attached.effect.channel == "sensing":
+                squared[len(response.site_of) :] += np.mean((moved * self.likelihood.sigma) ** 2, axis=(0, 1))
+            else:
+                squared += self._as_push(moved) ** 2
+        return np.sqrt(squared)
+
+    def _moved(self, own: slice, attached: Attached) -> Floats:
+        """(E, F, C) what a law does to the recordings [sigma]."""
+        values, point = self.fit.point.values.copy(), self.fit.point
+        values[own] = np.where(attached.amplitudes, 0.0, values[own])
+        episodes = np.arange(len(self.likelihood.inputs))
+        tiled = np.tile(values, (len(episodes), 1))
+        without = self.likelihood.residual(tiled, self.likelihood.inputs + point.launch, episodes)
+        return without - self.fit.linear.residual
+
+    def _as_push(self, moved: Floats) -> Floats:
+        """(S,) accelerations, each in proportion to its motion's, that move the recordings together as much."""
+        unit = self.response.unit * self.response.forces
+        root = spread(self.response, unit)
+        by_push = float(np.sum((self.response.tangent.pushes @ root) ** 2)) if root is not None else np.inf
+        return np.asarray(unit * np.sqrt(np.sum(moved**2) / max(by_push, 1e-300)))
+
+    @cached_property
+    def free(self) -> Free:
+        """With a discrepancy of any size beside its laws."""
+        return free(self.response)
+
+    @cached_property
+    def log_evidence(self) -> float:
+        """With a discrepancy in proportion to its laws; without laws, with none."""
+        return with_law(self.response, self.sizes) if self.laws else self.free.alone
+
+
+def widened(parent: Hypothesis, laws: Sequence[Attached]) -> tuple[Simulator, Likelihood]:
+    """Its simulator and likelihood with more laws; priors wide beside a modest law, bounded by what is physical."""
+    simulator = parent.simulator.with_effects([*parent.simulator.effects, *laws])
+    quantities = [q for a in laws for q in a.effect.quantities]
+    mean = [0.0 if q.amplitude else q.start for q in quantities]
+    std = [WIDTH * q.scale if q.amplitude else (q.high - q.low) / 4 for q in quantities]
+    likelihood = parent.likelihood
+    return simulator, replace(
+        likelihood,
+        predict=simulator.observe,
+        predict_alike=simulator.observe_alike,
+        parameters=simulator.parameters,
+        prior_mean=np.concatenate([likelihood.prior_mean, mean]),
+        prior_std=np.concatenate([likelihood.prior_std, std]),
+    )
+
+
+def from_parent(parent: Hypothesis, ranked: Ranked, iterations: int) -> Hypothesis:
+    """Fitted from the first-order solution about its parent's fit."""
+    attached = ranked.candidate.attached
+    simulator, likelihood = widened(parent, [attached])
+    amplitude = attached.amplitudes
+    found = solve_beside(parent, ranked)
+    tuned, base = parent.fit.free, parent.fit.point
+    starts = []
+    for share in _SHARES:
+        values = base.values.copy()
+        values[tuned] += share * found * parent.likelihood.prior_std[tuned]
+        numbers = np.where(amplitude, share * ranked.numbers, ranked.numbers)
+        values = np.concatenate([values, numbers])
+        starts.append(Point(np.clip(values, likelihood.low, likelihood.high), base.launch, np.inf))
+    costs, residuals = cost(likelihood, starts, parent.fit.robust)
+    best = int(np.argmin(costs))
+    everything = np.concatenate([tuned, len(base.values) + np.arange(len(amplitude))])
+    linear = _extended(parent.fit.linear, likelihood, starts[best], residuals[best], everything)
+    fit = minimise(likelihood, starts[best], everything, iterations, parent.fit.robust, 1.0, linear, fresh=False)
+    return Hypothesis((*parent.laws, attached), simulator, likelihood, fit, parent.response)
+
+
+def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:
+    """(p,) first-order change of the parent's parameters beside a law at its first-order numbers."""
+    tangent = parent.response.tangent
+    sizes = np.array([WIDTH * q.scale for q in ranked.candidate.attached.effect.quantities if q.amplitude])
+    amounts = ranked.numbers[ranked.candidate.attached.amplitudes] / sizes
+    if ranked.columns.shape[2] != len(amounts):
+        amounts = np.ones(1)
+    moved = replace(tangent, residual=tangent.residual + ranked.columns @ amounts)
+    return solve(moved, moved.normal, None).parameters
+
+
+def from_first_guess(hypothesis: Hypothesis) -> Hypothesis:
+    """Fitted again from the cell's first guess, its laws as they were found, on a growing horizon.
+
+    A simulator without a law has bent other parameters to stand for it, and from there a fit may end in a valley beside
+    the right one.
+    """
+    values = hypothesis.likelihood.prior_mean.copy()
+    first = len(hypothesis.simulator.cell.parameters)
+    values[first:] = hypothesis.fit.point.values[first:]
+    of_laws = np.arange(first, len(values))
+    *_, (_, begun) = growing(hypothesis.likelihood, values, of_laws[~_amplitudes(hypothesis)])
+    fit = freed(hypothesis.likelihood, begun.point, 5, hypothesis.fit.robust, of_laws)[1]
+    costs, residuals = cost(hypothesis.likelihood, [fit.point], hypothesis.fit.robust)
+    point, linear = replace(fit.point, cost=float(costs[0])), replace(fit.linear, residual=residuals[0])
+    return replace(hypothesis, fit=replace(fit, point=point, linear=linear, robust=hypothesis.fit.robust), near=None)
+
+
+def finished(hypothesis: Hypothesis) -> Hypothesis:
+    """At its optimum, with exact differences there."""
+    return replace(hypothesis, fit=settled(hypothesis.likelihood, hypothesis.fit), near=None)
+
+
+def further(hypothesis: Hypothesis, iterations: int) -> Hypothesis:
+    """Some more steps, with differences at the end."""
+    fit = hypothesis.fit
+    fit = minimise(hypothesis.likelihood, fit.point, fit.free, iterations, fit.robust, _SLIGHT, fit.linear)
+    return replace(hypothesis, fit=fit, near=None)
+
+
+def _amplitudes(hypothesis: Hypothesis) -> Floats:
+    return np.concatenate([a.amplitudes for a in hypothesis.laws]) if hypothesis.laws else np.zeros(0, bool)
+
+
+def _extended(old: Linear, likelihood: Likelihood, point: Point, residual: Floats, free: Ints) -> Linear:
+    """The parent's differences with those of the new numbers at the start."""
+    new = free[old.jacobian.shape[-1] :]
+    episodes = len(likelihood.inputs)
+    steps = inward(likelihood, point, new, np.full(len(new), _STEP))
+    values = np.tile(point.values, (len(new), 1))
+    values[np.arange(len(new)), new] += steps
+    index = np.tile(np.arange(episodes), len(new))
+    inputs = np.tile(likelihood.inputs + point.launch, (len(new), 1))
+    there = likelihood.residual(np.repeat(values, episodes, axis=0), inputs, index)
+    change = there.reshape(len(new), *residual.shape) - residual
+    scaled = np.moveaxis(change * (likelihood.prior_std[new] / steps)[:, None, None, None], 0, -1)
+    onset = np.concatenate([old.onset, np.zeros((episodes, len(new)))], axis=1)
+    return Linear(residual, np.concatenate([old.jacobian, scaled], axis=-1), old.launch_jacobian, onset)

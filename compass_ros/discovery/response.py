@@ -1,0 +1,153 @@
+"""A fitted model, linear about its fit: what its parameters, and pushes on all that is tracked, do to the residual."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from compass_ros.calibration.least_squares import Fit
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.discovery.evidence import Tangent
+from compass_ros.discovery.settings import MOMENTS
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import Attached
+from compass_ros.simulation.kicks import Kicks, inertias, kicks
+from compass_ros.simulation.sites import JOINTS, PLANAR, Site
+from compass_ros.types import Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """E episodes, D residuals of each, K moments, S directions of a discrepancy: first those of forces, one of a joint
+    and two of a body in the plane, then the C observed columns.
+
+    A push is an acceleration: a generalised force over the direction's own inertia.
+    """
+
+    simulator: Simulator
+    likelihood: Likelihood
+    fit: Fit
+    kicks: Kicks
+    sites: tuple[Site, ...]
+    """What is pushed."""
+    site_of: Ints
+    """(F,) which of them a direction of forces belongs to."""
+    inertia: Floats
+    """(F,) its entry of the mass matrix, mean over all moments [kg or kg m^2]."""
+    unit: Floats
+    """(S,) of forces the rms acceleration of the fitted motion [m/s^2 or rad/s^2], of signals the rms of what moves."""
+    pushes: Floats
+    """(E, D, K, S) change of the residual [sigma] per unit around a moment."""
+
+    @cached_property
+    def tangent(self) -> Tangent:
+        likelihood, fit = self.likelihood, self.fit
+        episodes, random = len(likelihood.inputs), likelihood.launch_std > 0
+        linear, point = fit.linear, fit.point
+        rows = (episodes, linear.residual[0].size)
+        return Tangent(
+            residual=linear.residual.reshape(rows),
+            parameters=linear.jacobian.reshape(*rows, -1),
+            own=linear.launch_jacobian.reshape(*rows, -1),
+            pushes=self.pushes.reshape(*rows, -1),
+            away=((likelihood.prior_mean - point.values) / likelihood.prior_std)[fit.free],
+            own_away=-point.launch[:, random] / likelihood.launch_std[random],
+            robust=fit.robust,
+            correlation_time=likelihood.correlation_time,
+        )
+
+    @property
+    def forces(self) -> Floats:
+        """(S,) 1 for directions of forces, 0 for signals."""
+        return (np.arange(len(self.unit)) < len(self.site_of)).astype(float)
+
+    @property
+    def values(self) -> Floats:
+        """(P,) of the cell's parameters, without those of laws."""
+        return self.fit.point.values[: len(self.simulator.cell.parameters)]
+
+    @cached_property
+    def states(self) -> Floats:
+        """(E, K, N, 6) of each site: x, y, vx, vy, mass, time; of a joint angle, 0, rate, 0, inertia, time."""
+        names = [site.names[0] for site in self.sites]
+        inputs = self.likelihood.inputs + self.fit.point.launch
+        tiled = np.tile(self.fit.point.values, (len(inputs), 1))
+        paths = self.simulator.paths(tiled, inputs, self.kicks.moments_s, names)
+        first = [int(np.flatnonzero(self.site_of == n)[0]) for n in range(len(names))]
+        mass = np.broadcast_to(self.inertia[first, None], (*paths.shape[:3], 1))
+        time = np.broadcast_to(self.kicks.moments_s[:, None, None], (*paths.shape[:3], 1))
+        return np.concatenate([paths, mass, time], axis=3)
+
+    def accelerations(self, attached: Attached, numbers: Floats) -> Floats:
+        """(E, K, S) of a law of forces with (q,) numbers, along the fitted motion; zero of signals."""
+        chosen = [next(n for n, s in enumerate(self.sites) if s.names[0] == name) for name in attached.objects]
+        states = np.ascontiguousarray(self.states[:, :, chosen])
+        forces = self.simulator.forces(attached, np.tile(numbers, (len(states), 1)), self.values, states)
+        out = np.zeros((*states.shape[:2], len(self.unit)))
+        for name, n in zip(attached.objects, chosen, strict=True):
+            own = np.flatnonzero(self.site_of == n)
+            out[:, :, own] = forces[name][..., : len(own)] / self.inertia[own]
+        return out
+
+    def changes(self, attached: Attached, numbers: Floats) -> Floats:
+        """(E, D, n) changes of the residual by (n, q) numbers of one more law, from rollouts."""
+        point, likelihood = self.fit.point, self.likelihood
+        with_it = self.simulator.with_effects([*self.simulator.effects, attached])
+        episodes, index = len(likelihood.inputs), np.tile(np.arange(len(likelihood.inputs)), len(numbers))
+        values = np.concatenate([np.tile(point.values, (len(numbers), 1)), numbers], axis=1)
+        inputs = np.tile(likelihood.inputs + point.launch, (len(numbers), 1))
+        predicted = with_it.observe(np.repeat(values, episodes, axis=0), inputs, likelihood.time_s[index])
+        there = np.nan_to_num(likelihood.difference(predicted, likelihood.measured[index]) / likelihood.sigma[index])
+        change = there.reshape(len(numbers), episodes, -1) - self.tangent.residual
+        return np.moveaxis(change, 0, 2)
+
+
+def respond(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> Response:
+    """The response of a fitted simulator, with the laws that it has."""
+    point = fit.point
+    inputs = likelihood.inputs + point.launch
+    unit_kicks = kicks(simulator, point.values, inputs, likelihood.time_s, MOMENTS)
+    sites = tuple(simulator.moving.values())
+    site_of, dofs = directions(simulator, sites)
+    matrices = inertias(simulator, point.values, unit_kicks.states)
+    inertia = matrices[..., dofs, dofs].mean(axis=(0, 1))
+    inverse = np.linalg.inv(matrices)[..., dofs] * inertia  # (E, K, V, S)
+    spacing = float(np.diff(unit_kicks.moments_s).mean()) if len(unit_kicks.moments_s) > 1 else 1.0
+    moved = np.einsum("efckv,ekvs->efcks", unit_kicks.response, inverse) * spacing
+    forced = np.einsum("efckv,ekvs->efcks", unit_kicks.response, inverse) * spacing
+    read = readings(likelihood, unit_kicks.moments_s)
+    seen = ~np.isnan(likelihood.measured)
+    moved = np.concatenate([forced, np.broadcast_to(read, (*seen.shape, *read.shape[3:]))], axis=4)
+    pushes = np.where(seen[..., None, None], moved / likelihood.sigma[..., None, None], 0.0)
+    model = simulator.physics.model
+    speeds = unit_kicks.states[..., 1 + model.nq : 1 + model.nq + model.nv][..., dofs]
+    accelerations = np.sqrt(np.mean(np.diff(speeds, axis=1) ** 2, axis=(0, 1))) / spacing
+    motion = np.nanstd(likelihood.measured, axis=1)
+    unit = np.concatenate([accelerations, np.nan_to_num(np.sqrt(np.nanmean(motion**2, axis=0)))])
+    rows = (len(inputs), seen[0].size, len(unit_kicks.moments_s), len(unit))
+    return Response(simulator, likelihood, fit, unit_kicks, sites, site_of, inertia, unit, pushes.reshape(rows))
+
+
+def readings(likelihood: Likelihood, moments: Floats) -> Floats:
+    """(E, F, C, K, C) change of each observed column by an error of each at a moment, linear in time between them."""
+    time = np.clip(likelihood.time_s, moments[0], moments[-1])
+    hats = np.maximum(1 - np.abs(time[:, :, None] - moments) / np.diff(moments).mean(), 0.0)
+    columns = likelihood.measured.shape[2]
+    return np.asarray(hats[:, :, None, :, None] * np.eye(columns)[:, None, :])
+
+
+def directions(simulator: Simulator, sites: tuple[Site, ...]) -> tuple[Ints, Ints]:
+    """(S,) sites and (S,) degrees of freedom in which they are pushed."""
+    model = simulator.physics.model
+    of, dofs = [], []
+    for n, site in enumerate(sites):
+        if site.kind in JOINTS:
+            first, count = int(model.jnt_dofadr[model.joint(site.name).id]), 1
+        else:
+            body = model.body(site.name).id
+            first, count = int(model.body_dofadr[body]), 2 if site.kind in PLANAR else int(model.body_dofnum[body])
+        of += [n] * count
+        dofs += list(range(first, first + count))
+    return np.array(of, int), np.array(dofs, int)

@@ -1,0 +1,129 @@
+"""Which set of laws: neighbours ranked to first order, the best of them fitted, the better half of those fitted well.
+
+Models are sets of laws on sites. Neighbours of a model have one law more, or one less. The search goes on from the best
+models as long as a better one is found, and begins anew from the cell's first guess where what is left still calls for
+a discrepancy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from math import log
+
+import numpy as np
+
+from compass_ros.discovery.candidates import Candidate
+from compass_ros.discovery.evidence import log_sum
+from compass_ros.discovery.first_order import FirstOrder, Ranked
+from compass_ros.discovery.hypothesis import Hypothesis, finished, from_first_guess, from_parent, further
+from compass_ros.types import Floats
+
+RACED = 6
+"""Neighbours that are fitted; the better half of them again with exact differences."""
+STEPS = 4
+"""Gauss-Newton steps of the first fit."""
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Log prior odds of models against the plain one.
+
+    Half of the probability is the plain model's, a quarter that of `unknown`, a quarter that of all laws; a law's share
+    is the same for each name, and within it for each set of sites. A second law is as improbable as the first.
+    """
+
+    sites: dict[str, int]
+    """Choices of sites by name of law."""
+
+    @staticmethod
+    def of(candidates: Sequence[Candidate]) -> Prior:
+        names = [c.name for c in candidates]
+        return Prior({name: names.count(name) for name in dict.fromkeys(names)})
+
+    unknown = log(0.5)
+
+    def of_laws(self, names: Iterable[str]) -> float:
+        """Each law counts once, whatever its sites."""
+        return sum(log(0.5 / len(self.sites) / self.sites[name]) for name in dict.fromkeys(names))
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Models by their log posterior odds against the plain one, the best first; without it and `unknown`."""
+
+    plain: Hypothesis
+    unknown: float
+    """Log posterior odds of a free discrepancy."""
+    models: tuple[Hypothesis, ...]
+    odds: tuple[float, ...]
+    first: tuple[Ranked, ...]
+    """Laws to first order about the plain fit."""
+
+    @property
+    def probabilities(self) -> tuple[float, float, Floats]:
+        """Of the plain model, of `unknown`, and of each model."""
+        logs = np.array([0.0, self.unknown, *self.odds])
+        p = np.exp(logs - log_sum(logs))
+        return float(p[0]), float(p[1]), p[2:]
+
+
+Tell = Callable[[str, float], bool]
+
+
+def rank(first: FirstOrder, candidates: Sequence[Candidate]) -> list[Ranked]:
+    """Laws at their best shape, the one that promises most first."""
+    found = [first.ranked(c)[:1] for c in candidates]
+    return sorted((f for some in found for f in some), key=lambda f: -f.gain)
+
+
+def search(plain: Hypothesis, candidates: Sequence[Candidate], threshold: Callable[[Sequence[Ranked]], float], tell: Tell) -> Found:
+    """From the plain model on."""
+    prior = Prior.of(candidates)
+    none = plain.free.alone
+    first = rank(FirstOrder(plain.response), candidates)
+    found = Found(plain, plain.free.log - none + prior.unknown, (), (), tuple(first))
+    beaten = threshold(first)
+    optimistic = max([found.unknown, *(f.gain + prior.of_laws([f.candidate.name]) for f in first)])
+    if optimistic < beaten:
+        return found
+    best, ranked = plain, first
+    known: dict[str, tuple[Hypothesis, float]] = {}
+
+    def odds(h: Hypothesis) -> float:
+        return h.log_evidence - none + prior.of_laws(a.effect.name for a in h.laws)
+
+    top = 0.0
+    while True:
+        tried = [from_parent(best, r, STEPS) for r in promising(ranked, best)[:RACED]]
+        tried.sort(key=odds, reverse=True)
+        kept = [further(h, STEPS) for h in tried[: (len(tried) + 1) // 2]]
+        for h in kept:
+            known[h.name] = (h, odds(h))
+        known |= {h.name: (h, odds(h)) for h in tried if h.name not in known}
+        leader = max(known.values(), key=lambda one: one[1])
+        tell("fit laws", min(0.2 + 0.2 * len(leader[0].laws), 0.9))
+        if leader[1] <= top + 1.0 or not best_remains(leader[0]):
+            break
+        best, top = leader
+        ranked = rank(FirstOrder(best.response), candidates)
+    ordered = sorted(known.values(), key=lambda one: -one[1])
+    last = finished(ordered[0][0])
+    ordered[0] = (last, odds(last))
+    return Found(plain, found.unknown, tuple(h for h, _ in ordered), tuple(o for _, o in ordered), tuple(first))
+
+
+def best_remains(model: Hypothesis) -> bool:
+    """Whether what a model leaves still calls for a free discrepancy."""
+    return model.free.log - max(model.free.alone, model.log_evidence) + Prior.unknown > 0
+
+
+def promising(ranked: Sequence[Ranked], parent: Hypothesis) -> list[Ranked]:
+    """Those that the parent does not have; of each name the best two choices of sites."""
+    has = {(a.effect.name, a.objects) for a in parent.laws}
+    out: list[Ranked] = []
+    for r in ranked:
+        key = (r.candidate.name, r.candidate.attached.objects)
+        if key not in has and sum(o.candidate.name == r.candidate.name for o in out) < 2:
+            out.append(r)
+    return out

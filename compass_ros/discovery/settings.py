@@ -1,0 +1,18 @@
+"""The numbers that decide a verdict, together; each with where it comes from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+MOMENTS = 50
+"""Moments of an episode at which pushes are given: 50 ms apart in the ordinary 2.5 s, a third of MEMORY_S."""
+MEMORY_S = 0.15
+"""Correlation length in time of the discrepancy [s]. With it a pendulum and the tables of the study were decided."""
+RHO = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2)
+RHO_PRIOR = (0.32, 0.21, 0.16, 0.15, 0.1, 0.06)
+"""Size of the discrepancy of a law, as a share of the law's own: published forms of one law differ by 2 to 10 per
+cent of it, and one that would need more than a fifth is another law (the study's table)."""
+FREE = tuple(np.geomspace(1e-3, 1.0, 10).tolist())
+"""Size of the discrepancy without a law, as a share of the rms acceleration of the motion, equally probable."""
+PRIOR_NONE = 0.5
+"""Prior probability that nothing is missing; the rest is shared by `unknown` and all laws in equal halves."""

@@ -1,0 +1,64 @@
+"""How much better than the plain model another one looks where nothing is missing: a parametric bootstrap.
+
+Recordings are simulated from the plain model, as its fit plus noise of the recordings' own correlation, and judged to
+first order by the same measure as the real ones: the largest log posterior odds of any model against the plain one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from compass_ros.calibration.least_squares import robust_weight
+from compass_ros.calibration.noise import Noise, correlated
+from compass_ros.discovery.discrepancy import spread
+from compass_ros.discovery.evidence import Factored
+from compass_ros.discovery.first_order import Ranked
+from compass_ros.discovery.response import Response
+from compass_ros.discovery.settings import FREE
+from compass_ros.types import Floats
+
+DRAWS = 200
+
+
+def largest_odds(
+    response: Response, ranked: Sequence[Ranked], priors: Sequence[float], free: float, noise: Noise, seed: int
+) -> Floats:
+    """(DRAWS,) largest log posterior odds against the plain model, in recordings of it.
+
+    `priors`: log prior odds of each ranked law; `free`: of a free discrepancy.
+    """
+    tangent = response.tangent
+    weight = robust_weight(tangent.residual, tangent.robust)
+    rng = np.random.default_rng(seed)
+    shape = response.likelihood.measured.shape
+    seen = ~np.isnan(response.likelihood.measured)
+    draws = np.stack(
+        [
+            np.where(seen, correlated(rng.standard_normal(shape), noise.correlation), 0.0).reshape(shape[0], -1)
+            for _ in range(DRAWS)
+        ],
+        axis=2,
+    )
+    weighted = draws * (weight / tangent.correlation_time)[:, :, None]
+    squares = np.einsum("edm,edm->m", weighted, draws)
+    still = np.zeros_like(tangent.away), np.zeros_like(tangent.own_away)
+
+    def products(columns: Floats) -> Floats:
+        return columns.transpose(0, 2, 1) @ weighted
+
+    centred = replace(tangent, away=still[0], own_away=still[1])
+    last = np.concatenate([products(c) for c in (tangent.parameters, tangent.own, tangent.pushes)], axis=1)
+    plain = Factored(centred, tangent.normal, None).logs(last, squares)
+    kinds = [response.unit * response.forces, response.unit * (1 - response.forces)]
+    sizes = [spread(response, s * kind) for kind in kinds for s in FREE]
+    by_size = np.stack([Factored(centred, tangent.normal, s).logs(last, squares) for s in sizes])
+    best = np.logaddexp.reduce(by_size - np.log(len(sizes)), axis=0) - plain + free
+    p = tangent.parameters.shape[2]
+    for one, prior in zip(ranked, priors, strict=True):
+        wider = centred.more(one.columns, np.zeros(one.columns.shape[2]))
+        more = np.concatenate([last[:, :p], products(one.columns), last[:, p:]], axis=1)
+        best = np.maximum(best, Factored(wider, wider.normal, None).logs(more, squares) - plain + prior)
+    return np.asarray(best)
