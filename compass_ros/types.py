@@ -384,6 +384,25 @@ class Where:
 
 
 @dataclass(frozen=True)
+class ExplainedLaw:
+    """One law of an explanation."""
+
+    name: str
+    sites: tuple[str, ...]
+    quantities: Mapping[str, EffectParameter]
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A set of laws, and how probable it is that it is what the simulator lacks."""
+
+    laws: tuple[ExplainedLaw, ...]
+    """Empty: nothing is missing. A law named `unknown`: a discrepancy of no known form."""
+    probability: float
+    log_evidence: float
+
+
+@dataclass(frozen=True)
 class Mismatch:
     """The answer to question 3: what is left."""
 
@@ -393,6 +412,10 @@ class Mismatch:
     undetectable: tuple[str, ...]
     next_experiment: str
     sentence: str
+    explanations: tuple[Explanation, ...] = ()
+    """The most probable first; over all that were asked the probabilities sum to one."""
+    false_alarm: float = math.nan
+    """Probability of a verdict other than `none` where nothing is missing, as it was asked for."""
 
 
 @dataclass(frozen=True)

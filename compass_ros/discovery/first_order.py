@@ -20,6 +20,8 @@ from compass_ros.discovery.response import Response
 from compass_ros.simulation.effects import Quantity
 from compass_ros.types import Floats
 
+SIGMAS = 5.0
+"""Standard deviations from which something is seen."""
 STARTS = 4
 """Places from which the shapes of a law are searched."""
 WIDTH = 20.0
@@ -40,6 +42,8 @@ class Ranked:
     """(E, D, a) change of the residual per standard deviation of each amplitude's prior."""
     gain: float
     """Fall of half the squared residual."""
+    seen: bool
+    """Whether these recordings would show the largest that is physical by SIGMAS."""
 
 
 class FirstOrder:
@@ -93,9 +97,9 @@ class FirstOrder:
         return gram - absorbed @ cross.T, pull - absorbed @ self._pull
 
     def ranked(self, candidate: Candidate) -> list[Ranked]:
-        """A law at its best shapes, each in its neighbourhood, the best first; empty where it does nothing."""
+        """A law at its best shapes, each in its neighbourhood, the best first."""
         found = self._of_forces(candidate) if candidate.by_force else self._rolled_out(candidate)
-        return sorted((f for f in found if f.gain > 0), key=lambda f: -f.gain)
+        return sorted(found, key=lambda f: -f.gain)
 
     # --- laws of forces
 
@@ -148,7 +152,13 @@ class FirstOrder:
             columns.append(np.einsum("edh,eh->ed", pushes, moved) * size)
             if not candidate.attached.effect.superposes:
                 break
-        return Ranked(candidate, numbers, np.stack(columns, axis=2), gain)
+        return self._judged(candidate, numbers, np.stack(columns, axis=2), gain)
+
+    def _judged(self, candidate: Candidate, numbers: Floats, columns: Floats, gain: float) -> Ranked:
+        quantities = [q for q in candidate.attached.effect.quantities if q.amplitude]
+        most = np.array([max(abs(q.low), abs(q.high)) / (WIDTH * q.scale) for q in quantities])[: columns.shape[2]]
+        told = np.sqrt(np.maximum(np.diag(self.of_columns(columns)[0]), 0.0))
+        return Ranked(candidate, numbers, columns, gain, bool(np.any(most * told > SIGMAS)))
 
     def _best_shapes(self, candidate: Candidate) -> list[Floats]:
         """(q,) shapes that gain most, each in its neighbourhood: a grid, then simplexes from its best places."""
@@ -200,7 +210,7 @@ class FirstOrder:
             sizes, gain = best_sizes(*self.of_columns(per_unit), low, high, WIDTH * scale)
             numbers = settings[0].copy()
             numbers[which] = sizes
-            found.append(Ranked(candidate, numbers, per_unit * WIDTH * scale, gain))
+            found.append(self._judged(candidate, numbers, per_unit * WIDTH * scale, gain))
             done = float(np.linalg.norm(change))
             if _FELT < done < _TWICE * before:
                 break

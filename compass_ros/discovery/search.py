@@ -77,17 +77,17 @@ def rank(first: FirstOrder, candidates: Sequence[Candidate]) -> list[Ranked]:
     return sorted((f for some in found for f in some), key=lambda f: -f.gain)
 
 
-def search(plain: Hypothesis, candidates: Sequence[Candidate], threshold: Callable[[Sequence[Ranked]], float], tell: Tell) -> Found:
-    """From the plain model on."""
+def search(
+    plain: Hypothesis, first: Sequence[Ranked], candidates: Sequence[Candidate], beaten: float, tell: Tell
+) -> Found:
+    """From the plain model on, with its neighbours ranked `first`; not where none could exceed the odds `beaten`."""
     prior = Prior.of(candidates)
     none = plain.free.alone
-    first = rank(FirstOrder(plain.response), candidates)
     found = Found(plain, plain.free.log - none + prior.unknown, (), (), tuple(first))
-    beaten = threshold(first)
     optimistic = max([found.unknown, *(f.gain + prior.of_laws([f.candidate.name]) for f in first)])
     if optimistic < beaten:
         return found
-    best, ranked = plain, first
+    best, ranked = plain, list(first)
     known: dict[str, tuple[Hypothesis, float]] = {}
 
     def odds(h: Hypothesis) -> float:
@@ -101,12 +101,16 @@ def search(plain: Hypothesis, candidates: Sequence[Candidate], threshold: Callab
         for h in kept:
             known[h.name] = (h, odds(h))
         known |= {h.name: (h, odds(h)) for h in tried if h.name not in known}
+        if not known:
+            break
         leader = max(known.values(), key=lambda one: one[1])
         tell("fit laws", min(0.2 + 0.2 * len(leader[0].laws), 0.9))
         if leader[1] <= top + 1.0 or not best_remains(leader[0]):
             break
         best, top = leader
         ranked = rank(FirstOrder(best.response), candidates)
+    if not known:
+        return found
     ordered = sorted(known.values(), key=lambda one: -one[1])
     last = finished(ordered[0][0])
     ordered[0] = (last, odds(last))
@@ -124,6 +128,6 @@ def promising(ranked: Sequence[Ranked], parent: Hypothesis) -> list[Ranked]:
     out: list[Ranked] = []
     for r in ranked:
         key = (r.candidate.name, r.candidate.attached.objects)
-        if key not in has and sum(o.candidate.name == r.candidate.name for o in out) < 2:
+        if r.gain > 0 and key not in has and sum(o.candidate.name == r.candidate.name for o in out) < 2:
             out.append(r)
     return out
