@@ -13,7 +13,7 @@ import numpy as np
 from compass_ros.cells import Cell
 from compass_ros.cells.loading import cells_folder
 from compass_ros.discovery import Discovery
-from compass_ros.discovery.where import TableMap
+from compass_ros.discovery.maps import TableMap
 from compass_ros.errors import ConfigError
 from compass_ros.reporting import Candidate, ReportExtras, ResidualMap, Scene, Shape, write_report, write_result
 from compass_ros.reporting.kept import RESULT, TRAJECTORIES, write_trajectories

@@ -57,9 +57,7 @@ def free(response: Response) -> Free:
     logs = np.array([f.log for f in found])
     best = int(np.argmax(logs))
     shape = (len(response.tangent.residual), len(response.kicks.moments_s), len(response.unit))
-    return Free(
-        alone.log, log_sum(logs - np.log(len(logs))), best < len(FREE), found[best].pushes.reshape(shape)
-    )
+    return Free(alone.log, log_sum(logs - np.log(len(logs))), best < len(FREE), found[best].pushes.reshape(shape))
 
 
 def with_law(response: Response, sizes: Floats) -> float:

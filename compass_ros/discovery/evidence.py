@@ -113,20 +113,21 @@ class Factored:
 
     def __init__(self, tangent: Tangent, normal: Normal, spread: Floats | None) -> None:
         gram = normal.gram
-        episodes, p, l = len(gram), tangent.parameters.shape[2], tangent.own.shape[2]
+        episodes, p, own_numbers = len(gram), tangent.parameters.shape[2], tangent.own.shape[2]
         pushes = tangent.pushes.shape[2]
         mixed = np.zeros((pushes, 0)) if spread is None else spread
         self._mixed = np.broadcast_to(mixed, (episodes, *mixed.shape[-2:]))
         self._turned = self._mixed.transpose(0, 2, 1)
-        self._own, self._pushes = slice(p, p + l), slice(p + l, p + l + pushes)
-        self._p, self._l, self._tangent, self._constant = p, l, tangent, normal.constant
+        first = p + own_numbers
+        self._own, self._pushes = slice(p, first), slice(first, first + pushes)
+        self._p, self._l, self._tangent, self._constant = p, own_numbers, tangent, normal.constant
         own, hats, q = self._own, self._pushes, self._mixed.shape[2]
-        inner = np.empty((episodes, l + q, l + q))
-        inner[:, :l, :l] = gram[:, own, own]
-        inner[:, :l, l:] = gram[:, own, hats] @ self._mixed
-        inner[:, l:, :l] = inner[:, :l, l:].transpose(0, 2, 1)
-        inner[:, l:, l:] = self._turned @ gram[:, hats, hats] @ self._mixed
-        self._factor = np.linalg.cholesky(inner + np.eye(l + q))
+        inner = np.empty((episodes, own_numbers + q, own_numbers + q))
+        inner[:, :own_numbers, :own_numbers] = gram[:, own, own]
+        inner[:, :own_numbers, own_numbers:] = gram[:, own, hats] @ self._mixed
+        inner[:, own_numbers:, :own_numbers] = inner[:, :own_numbers, own_numbers:].transpose(0, 2, 1)
+        inner[:, own_numbers:, own_numbers:] = self._turned @ gram[:, hats, hats] @ self._mixed
+        self._factor = np.linalg.cholesky(inner + np.eye(own_numbers + q))
         across = np.concatenate([gram[:, own, :p], self._turned @ gram[:, hats, :p]], axis=1)
         self._half = np.linalg.solve(self._factor, across)
         taken = np.einsum("eij,eik->jk", self._half, self._half)
@@ -140,9 +141,7 @@ class Factored:
         """(m,) logs, (p, m) steps and (E, l + q, m) halves for (E, n, m) products of the columns with residuals."""
         tangent = self._tangent
         with_own = last[:, self._own] - tangent.own_away[:, :, None]
-        half = np.linalg.solve(
-            self._factor, np.concatenate([with_own, self._turned @ last[:, self._pushes]], axis=1)
-        )
+        half = np.linalg.solve(self._factor, np.concatenate([with_own, self._turned @ last[:, self._pushes]], axis=1))
         pull = last[:, : self._p].sum(axis=0) - np.einsum("eip,eim->pm", self._half, half)
         pull -= tangent.away[:, None]
         step = -np.linalg.solve(self._outer.T, np.linalg.solve(self._outer, pull))

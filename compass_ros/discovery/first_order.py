@@ -52,13 +52,13 @@ class FirstOrder:
     def __init__(self, response: Response) -> None:
         self.response = response
         tangent, gram = response.tangent, response.tangent.normal.gram
-        p, l = tangent.parameters.shape[2], tangent.own.shape[2]
-        own = slice(p, p + l)
-        inner = gram[:, own, own] + np.eye(l)
+        p, numbers = tangent.parameters.shape[2], tangent.own.shape[2]
+        own = slice(p, p + numbers)
+        inner = gram[:, own, own] + np.eye(numbers)
         pulled = gram[:, own].copy()
         pulled[..., -1] -= tangent.own_away
         reduced = gram - gram[:, :, own] @ np.linalg.solve(inner, pulled)
-        self._keep = np.r_[0:p, p + l : gram.shape[1]]
+        self._keep = np.r_[0:p, p + numbers : gram.shape[1]]
         self._gram = reduced[:, self._keep][:, :, self._keep]
         self._parameters = p
         whole = self._gram.sum(axis=0)

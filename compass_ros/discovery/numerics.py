@@ -7,35 +7,72 @@ from dataclasses import replace
 
 import numpy as np
 
+from compass_ros.calibration.least_squares import Fit, normal_equations, robust_weight
+from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.evidence import solve
 from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.joint import Joint
+from compass_ros.discovery.screen import Space
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.numerics import other_numerics
 from compass_ros.types import Floats
 
+MOSTLY = 0.5
+"""Share of the excess from which it is put down to numerics."""
 
-def numerical_cause(plain: Hypothesis, best: float) -> str:
-    """Which change of numerics has higher log odds than the `best` model against the plain one; empty: none.
 
-    The calibrated simulator plays the fitted episodes again with other numerics. What that moves is taken as it is, to
-    first order beside the parameters: a model without a number of its own.
+def numerical_cause(space: Space, excess: float) -> str:
+    """What a change of the simulator's numerics explains of `excess` [log likelihood], as a sentence; else empty.
+
+    The calibrated simulator plays the fitted episodes again with other numerics. What that moves, less what the
+    parameters could take, is taken as it is, with amplitude one: physics has no business in it.
     """
-    tangent = plain.response.tangent
-    for what, options in other_numerics(plain.simulator):
-        changed = replace(tangent, residual=tangent.residual + _moved(plain, options))
-        odds = solve(changed, changed.normal, None).log - plain.free.alone
-        if odds > best:
-            return f"what is left goes away with {what}"
+    for what, options in other_numerics(space.simulator):
+        share = _gain(space, options) / max(excess, 1e-9)
+        if share > MOSTLY:
+            return f"{100 * min(share, 1.0):.0f} % of what is left goes away with {what}"
     return ""
 
 
-def _moved(plain: Hypothesis, options: Mapping[str, float]) -> Floats:
-    """(E, D) change of the residual by other numerics [sigma]."""
-    likelihood, simulator, point = plain.likelihood, plain.simulator, plain.fit.point
+def shift(joint: Joint) -> Floats:
+    """(p,) how far the free quantities of a fit move when the time step is halved [prior standard deviations].
+
+    What an effect is said to be is a claim about physics, and a simulator with a finite step says it not quite right.
+    """
+    simulator, likelihood, fit = joint.simulator, joint.likelihood, joint.fit
+    moved = _moved(simulator, likelihood, fit, {"timestep": 0.5 * simulator.options.timestep})
+    weight = robust_weight(fit.linear.residual, fit.robust)
+    jacobian = fit.linear.jacobian
+    hessian, _ = normal_equations(likelihood, fit.point, fit.linear, fit.free, fit.robust)
+    pull = np.einsum("efcp,efc->p", jacobian, weight * moved)
+    return np.asarray(-np.linalg.solve(hessian, np.pad(pull, (0, len(hessian) - len(pull)))))[: len(pull)]
+
+
+def _gain(space: Space, options: Mapping[str, float]) -> float:
+    """Fall of the cost with other numerics, after the parameters have adapted to first order."""
+    change = _moved(space.simulator, space.likelihood, space.fit, options).reshape(space.weight.shape) * space.weight
+    matrix, pull = space.reduced_tangent(change.reshape(-1, 1))
+    return -float(pull[0] + 0.5 * matrix[0, 0])
+
+
+def _moved(simulator: Simulator, likelihood: Likelihood, fit: Fit, options: Mapping[str, float]) -> Floats:
+    """(E, F, C) change of the residual by other numerics [sigma]; 0 where nothing was measured."""
     other = Simulator(simulator.cell, simulator.effects, simulator.threads, options).driven(simulator.physics.bank)
-    values = np.tile(point.values, (len(likelihood.inputs), 1))
-    inputs = likelihood.inputs + point.launch
-    there, here = (s.observe(values, inputs, likelihood.time_s) for s in (other, simulator))
-    change = np.nan_to_num((there - here) / likelihood.sigma)
-    change = np.where(np.isnan(likelihood.measured), 0.0, change)
-    return np.asarray(change.reshape(len(change), -1))
+    values = np.tile(fit.point.values, (len(likelihood.inputs), 1))
+    inputs = likelihood.inputs + fit.point.launch
+    change = other.observe(values, inputs, likelihood.time_s) - simulator.observe(values, inputs, likelihood.time_s)
+    return np.where(np.isnan(likelihood.measured), 0.0, change / likelihood.sigma)
+
+
+def numerics_as_model(plain: Hypothesis, best: float) -> str:
+    """Which change of numerics has higher log odds than the `best` model against the plain one; empty: none.
+
+    What it moves is taken as it is, to first order beside the parameters: a model without a number of its own.
+    """
+    tangent, shape = plain.response.tangent, plain.response.tangent.residual.shape
+    for what, options in other_numerics(plain.simulator):
+        moved = _moved(plain.simulator, plain.likelihood, plain.fit, options)
+        changed = replace(tangent, residual=tangent.residual + np.nan_to_num(moved).reshape(shape))
+        if solve(changed, changed.normal, None).log - plain.free.alone > best:
+            return f"what is left goes away with {what}"
+    return ""

@@ -16,7 +16,8 @@ import numpy as np
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.first_order import FirstOrder, Ranked
-from compass_ros.discovery.hypothesis import Hypothesis, finished, from_first_guess, from_parent, further
+from compass_ros.discovery.hypothesis import Hypothesis, finished, from_parent, further
+from compass_ros.discovery.settings import PRIOR_LAW, PRIOR_UNKNOWN
 from compass_ros.types import Floats
 
 RACED = 6
@@ -41,11 +42,9 @@ class Prior:
         names = [c.name for c in candidates]
         return Prior({name: names.count(name) for name in dict.fromkeys(names)})
 
-    unknown = log(0.5)
-
     def of_laws(self, names: Iterable[str]) -> float:
         """Each law counts once, whatever its sites."""
-        return sum(log(0.5 / len(self.sites) / self.sites[name]) for name in dict.fromkeys(names))
+        return sum(PRIOR_LAW - log(len(self.sites) * self.sites[name]) for name in dict.fromkeys(names))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +82,7 @@ def search(
     """From the plain model on, with its neighbours ranked `first`; not where none could exceed the odds `beaten`."""
     prior = Prior.of(candidates)
     none = plain.free.alone
-    found = Found(plain, plain.free.log - none + prior.unknown, (), (), tuple(first))
+    found = Found(plain, plain.free.log - none + PRIOR_UNKNOWN, (), (), tuple(first))
     optimistic = max([found.unknown, *(f.gain + prior.of_laws([f.candidate.name]) for f in first)])
     if optimistic < beaten:
         return found
@@ -119,7 +118,7 @@ def search(
 
 def best_remains(model: Hypothesis) -> bool:
     """Whether what a model leaves still calls for a free discrepancy."""
-    return model.free.log - max(model.free.alone, model.log_evidence) + Prior.unknown > 0
+    return model.free.log - max(model.free.alone, model.log_evidence) + PRIOR_UNKNOWN > 0
 
 
 def promising(ranked: Sequence[Ranked], parent: Hypothesis) -> list[Ranked]:

@@ -14,5 +14,7 @@ RHO_PRIOR = (0.32, 0.21, 0.16, 0.15, 0.1, 0.06)
 cent of it, and one that would need more than a fifth is another law (the study's table)."""
 FREE = tuple(np.geomspace(1e-3, 1.0, 10).tolist())
 """Size of the discrepancy without a law, as a share of the rms acceleration of the motion, equally probable."""
-PRIOR_NONE = 0.5
-"""Prior probability that nothing is missing; the rest is shared by `unknown` and all laws in equal halves."""
+PRIOR_UNKNOWN = float(np.log(0.5))
+PRIOR_LAW = float(np.log(0.5))
+"""Log prior odds against the plain model: half of the probability is that nothing is missing, a quarter that of
+`unknown`, a quarter that of all laws together."""

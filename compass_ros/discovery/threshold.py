@@ -17,18 +17,18 @@ from compass_ros.discovery.discrepancy import spread
 from compass_ros.discovery.evidence import Factored
 from compass_ros.discovery.first_order import Ranked
 from compass_ros.discovery.response import Response
-from compass_ros.discovery.settings import FREE
+from compass_ros.discovery.settings import FREE, PRIOR_UNKNOWN
 from compass_ros.types import Floats
 
 DRAWS = 200
 
 
 def largest_odds(
-    response: Response, ranked: Sequence[Ranked], priors: Sequence[float], free: float, noise: Noise, seed: int
+    response: Response, ranked: Sequence[Ranked], priors: Sequence[float], noise: Noise, seed: int
 ) -> Floats:
     """(DRAWS,) largest log posterior odds against the plain model, in recordings of it.
 
-    `priors`: log prior odds of each ranked law; `free`: of a free discrepancy.
+    `priors`: log prior odds of each ranked law.
     """
     tangent = response.tangent
     weight = robust_weight(tangent.residual, tangent.robust)
@@ -47,7 +47,7 @@ def largest_odds(
     still = np.zeros_like(tangent.away), np.zeros_like(tangent.own_away)
 
     def products(columns: Floats) -> Floats:
-        return columns.transpose(0, 2, 1) @ weighted
+        return np.asarray(columns.transpose(0, 2, 1) @ weighted)
 
     centred = replace(tangent, away=still[0], own_away=still[1])
     last = np.concatenate([products(c) for c in (tangent.parameters, tangent.own, tangent.pushes)], axis=1)
@@ -55,7 +55,7 @@ def largest_odds(
     kinds = [response.unit * response.forces, response.unit * (1 - response.forces)]
     sizes = [spread(response, s * kind) for kind in kinds for s in FREE]
     by_size = np.stack([Factored(centred, tangent.normal, s).logs(last, squares) for s in sizes])
-    best = np.logaddexp.reduce(by_size - np.log(len(sizes)), axis=0) - plain + free
+    best = np.logaddexp.reduce(by_size - np.log(len(sizes)), axis=0) - plain + PRIOR_UNKNOWN
     p = tangent.parameters.shape[2]
     for one, prior in zip(ranked, priors, strict=True):
         wider = centred.more(one.columns, np.zeros(one.columns.shape[2]))

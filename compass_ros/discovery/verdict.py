@@ -12,9 +12,10 @@ from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import with_launches
 from compass_ros.calibration.residuals import covariance, jackknife
 from compass_ros.discovery.design import next_experiment
+from compass_ros.discovery.finding import Discovery, Tried
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.search import Found
-from compass_ros.discovery.where import TableMap, left_by, residual_map, whereabouts
+from compass_ros.discovery.where import left_by, residual_map, whereabouts
 from compass_ros.discovery.words import errors, place, value_of, where_of
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import rms_distance
@@ -32,55 +33,6 @@ from compass_ros.types import (
 UNKNOWN = "unknown"
 SAID = 6
 """Explanations that a result lists, the most probable first; the rest together are less than a thousandth or so."""
-
-
-@dataclass(frozen=True)
-class Tried:
-    """One model for the report's ranking."""
-
-    name: str
-    channel: str
-    log_evidence: float
-    held_out_gain: float
-    kept: bool
-    note: str
-
-
-@dataclass(frozen=True)
-class Discovery:
-    """The verdict, and the simulator with the laws inside where some were found."""
-
-    mismatch: Mismatch
-    simulator: Simulator | None = None
-    values: Floats | None = None
-    """(P + Q,) parameters and laws of that simulator."""
-    parameters: Floats | None = None
-    """(P,) the parameters, fitted together with the laws."""
-    std: Floats | None = None
-    """(P,) one standard deviation of the parameters."""
-    effect_std: Floats | None = None
-    """(P + Q,) one standard deviation of `values`."""
-    tried: tuple[Tried, ...] = ()
-    before: TableMap | None = None
-    after: TableMap | None = None
-    warnings: Sequence[str] = ()
-    noise: Noise | None = None
-    """With what the fit has shown of it, where that is more than the recordings alone did."""
-
-
-def not_evaluated(reason: str) -> Discovery:
-    """No verdict, said plainly."""
-    return Discovery(Mismatch("not_evaluated", None, (), (), "", f"Missing physics was not looked for: {reason}."))
-
-
-def fit_failed(reason: str) -> Discovery:
-    """No verdict, for a fit of the search went wrong."""
-    return Discovery(Mismatch("fit_failed", None, (), (), "", f"No verdict on missing physics: {reason}."))
-
-
-def data_bad(sentence: str) -> Discovery:
-    """No verdict, for the recordings are wrong."""
-    return Discovery(Mismatch("data_bad", None, (), (), "", sentence))
 
 
 @dataclass(frozen=True)
@@ -208,9 +160,7 @@ class Judge:
         none, unknown, of_models = self.found.probabilities
         rows = [
             Explanation((), none, self.found.plain.log_evidence),
-            Explanation(
-                (ExplainedLaw(UNKNOWN, (), {}),), unknown, self.found.plain.log_evidence + self.found.unknown
-            ),
+            Explanation((ExplainedLaw(UNKNOWN, (), {}),), unknown, self.found.plain.log_evidence + self.found.unknown),
         ]
         for model, p in zip(self.found.models, of_models, strict=True):
             rows.append(Explanation(_explained(model), float(p), model.log_evidence))

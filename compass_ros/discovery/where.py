@@ -2,36 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from compass_ros.discovery.discrepancy import Free, spread
 from compass_ros.discovery.evidence import evidences, log_sum
+from compass_ros.discovery.maps import CELL_M, TableMap
 from compass_ros.discovery.response import Response
 from compass_ros.discovery.settings import FREE
 from compass_ros.simulation.sites import JOINTS
 from compass_ros.types import Floats, Region, Where
 
-CELL_M = 0.05
-"""Side of a cell of the map."""
 _HOLDS = 0.9
 """Share of the discrepancy's square that a region holds."""
 _LABEL = "acceleration that the simulator lacks"
-
-
-@dataclass(frozen=True)
-class TableMap:
-    """A quantity over the table's plane, on a regular grid."""
-
-    label: str
-    unit: str
-    x_m: Floats
-    """(X,) centres of the cells."""
-    y_m: Floats
-    """(Y,) centres of the cells."""
-    value: Floats
-    """(Y, X); NaN where no recording passed."""
 
 
 def whereabouts(response: Response, free: Free) -> Where:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from compass_ros.discovery.joint import ERROR_BARS
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Channel, EffectFinding, Floats, Phase, Region, Unit, Where
 
-ERROR_BARS = 2.0
-"""Error bars from zero within which a size is told by its ratio to other numbers alone."""
 PHASE: dict[str, Phase] = {
     "rate_dependent_restitution": "all",
     "tangential_impulse": "all",

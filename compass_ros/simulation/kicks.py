@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -43,7 +44,7 @@ def kicks(simulator: Simulator, values: Floats, inputs: Floats, time_s: Floats, 
     base = raw.rows(states[:, :-1], states[:, 1:], sensors)
     stretches = [
         _stretch(simulator, chart, raw, values, controls, (states, base), sizes, slice(first, last))
-        for first, last in zip(moments[:-1], moments[1:], strict=True)
+        for first, last in pairwise(moments)
     ]
     response = []
     for e in range(episodes):

@@ -95,7 +95,7 @@ def changes(chart: Chart, states: Floats, moments: Ints, time_step: float) -> Fl
             rms[group] = np.maximum(rms[group], 0.1 * max(float(rms[group].max()), 1e-6))
     stretch = float(np.max(np.diff(moments))) * time_step
     active = np.sqrt(np.mean(states[..., 1 + chart.nq + chart.nv :] ** 2, axis=(0, 1)))[: chart.na]
-    return SMALL * np.concatenate([stretch * rms, rms, np.maximum(active, 1e-3)])
+    return np.asarray(SMALL * np.concatenate([stretch * rms, rms, np.maximum(active, 1e-3)]))
 
 
 def chained(

@@ -1,0 +1,53 @@
+"""All explanations of what a calibrated simulator lacks, weighed by one measure: from a fit to a verdict."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.noise import Noise
+from compass_ros.calibration.refine import Refined
+from compass_ros.discovery.candidates import candidates
+from compass_ros.discovery.finding import Discovery, fit_failed
+from compass_ros.discovery.first_order import FirstOrder, Ranked
+from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.numerics import numerics_as_model
+from compass_ros.discovery.search import Prior, Tell, rank, search
+from compass_ros.discovery.threshold import largest_odds
+from compass_ros.discovery.verdict import Judge
+from compass_ros.simulation import Simulator
+
+ALPHA = 0.01
+"""Probability of a verdict other than `none` where nothing is missing."""
+
+
+def weigh(
+    simulator: Simulator,
+    refined: Refined,
+    held_out: Likelihood,
+    noise: Noise,
+    seed: int,
+    tell: Tell,
+    warnings: tuple[str, ...] = (),
+) -> Discovery:
+    """What the recordings call for; `held_out` is opened after the verdict, to say what it is worth."""
+    likelihood = refined.likelihood
+    plain = Hypothesis((), simulator, likelihood, refined.fit)
+    asked = candidates(simulator, plain.response.values, likelihood.inputs, likelihood.time_s)
+    first = rank(FirstOrder(plain.response), asked)
+    prior = Prior.of(asked)
+    odds = largest_odds(plain.response, first, [prior.of_laws([f.candidate.name]) for f in first], noise, seed)
+    threshold = max(float(np.quantile(odds, 1 - ALPHA)), 0.0)
+    tell("fit effects", 0.3)
+    found = search(plain, first, asked, threshold, tell)
+    best = max([found.unknown, *found.odds])
+    if best > threshold and (cause := numerics_as_model(plain, best)):
+        return fit_failed(f"{cause}, which is the simulator's numerics and not physics")
+    tell("weigh effects", 0.95)
+    return Judge(found, held_out, noise, ALPHA, threshold, odds, undetectable(first), seed, warnings).discovery()
+
+
+def undetectable(first: list[Ranked]) -> tuple[str, ...]:
+    """Names of laws that these recordings would show on no site."""
+    seen = {r.candidate.name for r in first if r.seen}
+    return tuple(dict.fromkeys(r.candidate.name for r in first if r.candidate.name not in seen))
