@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,6 +23,8 @@ _SHARES = (0.15, 0.4, 0.7, 1.0)
 """Parts of the first-order step from which a fit begins, the best of them."""
 _STEP = 0.02
 """Finite differences of a new law's numbers, in standard deviations of their priors."""
+EPISODES = 9
+"""Episodes, or windows, to which the models of a race are fitted until it is over."""
 _SLIGHT = 0.3
 """Gain [log likelihood] of a step that is the last one: models are compared by whole units."""
 
@@ -151,21 +153,47 @@ def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:
     return solve(moved, moved.normal, None).parameters
 
 
-def from_first_guess(hypothesis: Hypothesis) -> Hypothesis:
-    """Fitted again from the cell's first guess, its laws as they were found, on a growing horizon.
+def race(parent: Hypothesis, starts: Sequence[tuple[Attached, Floats]]) -> list[Hypothesis]:
+    """The best two of models with one more law each, fitted from the cell's first guess by successive halving.
 
     A simulator without a law has bent other parameters to stand for it, and from there a fit may end in a valley beside
-    the right one.
+    the right one. All models are fitted to the beginning of some episodes, the better half of them to more of it, and so
+    on; the last ones to all there is. `starts`: each law with its (q,) numbers.
     """
-    values = hypothesis.likelihood.prior_mean.copy()
-    first = len(hypothesis.simulator.cell.parameters)
-    values[first:] = hypothesis.fit.point.values[first:]
-    of_laws = np.arange(first, len(values))
-    *_, (_, begun) = growing(hypothesis.likelihood, values, of_laws[~_amplitudes(hypothesis)])
-    fit = freed(hypothesis.likelihood, begun.point, 5, hypothesis.fit.robust, of_laws)[1]
-    costs, residuals = cost(hypothesis.likelihood, [fit.point], hypothesis.fit.robust)
-    point, linear = replace(fit.point, cost=float(costs[0])), replace(fit.linear, residual=residuals[0])
-    return replace(hypothesis, fit=replace(fit, point=point, linear=linear, robust=hypothesis.fit.robust), near=None)
+    count = len(parent.likelihood.inputs)
+    rows = np.unique(np.linspace(0, count - 1, min(count, EPISODES)).astype(int))
+    runners = [_runner(parent, attached, numbers, rows) for attached, numbers in starts]
+    alive = list(range(len(runners)))
+    values: dict[int, Floats] = {}
+    for _ in parent.likelihood.horizons:
+        costs = {}
+        for i in alive:
+            _, fit = next(runners[i])
+            costs[i], values[i] = fit.point.cost, fit.point.values
+        alive = sorted(alive, key=lambda i: costs[i])[: max((len(alive) + 1) // 2, 2)]
+    return [_whole(parent, starts[i][0], values[i]) for i in alive]
+
+
+def _runner(
+    parent: Hypothesis, attached: Attached, numbers: Floats, rows: Ints
+) -> Iterator[tuple[Likelihood, Fit]]:
+    """Fits of one model to some episodes, longer from one to the next; shapes stay as they are."""
+    simulator, likelihood = widened(parent, [attached])
+    values = np.concatenate([parent.likelihood.prior_mean, numbers])
+    first, own = len(simulator.cell.parameters), len(parent.fit.point.values)
+    values[first:own] = parent.fit.point.values[first:]
+    amplitudes = np.concatenate([a.amplitudes for a in (*parent.laws, attached)])
+    return growing(likelihood.of(rows), values, first + np.flatnonzero(~amplitudes))
+
+
+def _whole(parent: Hypothesis, attached: Attached, values: Floats) -> Hypothesis:
+    """A model fitted to all episodes from (P + q,) values."""
+    simulator, likelihood = widened(parent, [attached])
+    of_laws = np.arange(len(simulator.cell.parameters), len(values))
+    point = Point(values, np.zeros_like(likelihood.inputs), np.inf)
+    fit = freed(likelihood, point, 5, parent.fit.robust, of_laws)[1]
+    fit = minimise(likelihood, fit.point, fit.free, 5, parent.fit.robust, _SLIGHT)
+    return Hypothesis((*parent.laws, attached), simulator, likelihood, fit)
 
 
 def finished(hypothesis: Hypothesis) -> Hypothesis:
@@ -178,10 +206,6 @@ def further(hypothesis: Hypothesis, iterations: int) -> Hypothesis:
     fit = hypothesis.fit
     fit = minimise(hypothesis.likelihood, fit.point, fit.free, iterations, fit.robust, _SLIGHT, fit.linear)
     return replace(hypothesis, fit=fit, near=None)
-
-
-def _amplitudes(hypothesis: Hypothesis) -> Floats:
-    return np.concatenate([a.amplitudes for a in hypothesis.laws]) if hypothesis.laws else np.zeros(0, bool)
 
 
 def _extended(old: Linear, likelihood: Likelihood, point: Point, residual: Floats, free: Ints) -> Linear:

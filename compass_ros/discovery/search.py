@@ -16,8 +16,9 @@ import numpy as np
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.first_order import FirstOrder, Ranked
-from compass_ros.discovery.hypothesis import Hypothesis, finished, from_parent, further
+from compass_ros.discovery.hypothesis import Hypothesis, finished, from_parent, further, race
 from compass_ros.discovery.settings import PRIOR_LAW, PRIOR_UNKNOWN
+from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
 
 RACED = 6
@@ -86,25 +87,25 @@ def search(
     optimistic = max([found.unknown, *(f.gain + prior.of_laws([f.candidate.name]) for f in first)])
     if optimistic < beaten:
         return found
-    best, ranked = plain, list(first)
     known: dict[str, tuple[Hypothesis, float]] = {}
 
-    def odds(h: Hypothesis) -> float:
-        return h.log_evidence - none + prior.of_laws(a.effect.name for a in h.laws)
+    def take(models: Iterable[Hypothesis]) -> None:
+        for h in models:
+            odds = h.log_evidence - none + prior.of_laws(a.effect.name for a in h.laws)
+            if h.name not in known or odds > known[h.name][1]:
+                known[h.name] = (h, odds)
 
-    top = 0.0
+    best, top, ranked = plain, 0.0, list(first)
     while True:
         tried = [from_parent(best, r, STEPS) for r in promising(ranked, best)[:RACED]]
-        tried.sort(key=odds, reverse=True)
-        kept = [further(h, STEPS) for h in tried[: (len(tried) + 1) // 2]]
-        for h in kept:
-            known[h.name] = (h, odds(h))
-        known |= {h.name: (h, odds(h)) for h in tried if h.name not in known}
-        if not known:
-            break
+        tried.sort(key=lambda h: -h.log_evidence)
+        take(tried)
+        take(further(h, STEPS) for h in tried[: (len(tried) + 1) // 2])
+        if not known or calls_for_more(max(known.values(), key=lambda one: one[1])[0]):
+            take(race(best, cold_starts(ranked, best)))
         leader = max(known.values(), key=lambda one: one[1])
-        tell("fit laws", min(0.2 + 0.2 * len(leader[0].laws), 0.9))
-        if leader[1] <= top + 1.0 or not best_remains(leader[0]):
+        tell("fit effects", min(0.3 + 0.2 * len(leader[0].laws), 0.9))
+        if leader[1] <= top or not calls_for_more(leader[0]):
             break
         best, top = leader
         ranked = rank(FirstOrder(best.response), candidates)
@@ -112,11 +113,11 @@ def search(
         return found
     ordered = sorted(known.values(), key=lambda one: -one[1])
     last = finished(ordered[0][0])
-    ordered[0] = (last, odds(last))
+    ordered[0] = (last, last.log_evidence - none + prior.of_laws(a.effect.name for a in last.laws))
     return Found(plain, found.unknown, tuple(h for h, _ in ordered), tuple(o for _, o in ordered), tuple(first))
 
 
-def best_remains(model: Hypothesis) -> bool:
+def calls_for_more(model: Hypothesis) -> bool:
     """Whether what a model leaves still calls for a free discrepancy."""
     return model.free.log - max(model.free.alone, model.log_evidence) + PRIOR_UNKNOWN > 0
 
@@ -130,3 +131,21 @@ def promising(ranked: Sequence[Ranked], parent: Hypothesis) -> list[Ranked]:
         if r.gain > 0 and key not in has and sum(o.candidate.name == r.candidate.name for o in out) < 2:
             out.append(r)
     return out
+
+
+def cold_starts(ranked: Sequence[Ranked], parent: Hypothesis) -> list[tuple[Attached, Floats]]:
+    """Each law that the parent lacks, on the sites that promise most, at a modest size."""
+    has = {a.effect.name for a in parent.laws}
+    best: dict[str, Ranked] = {}
+    for r in ranked:
+        if r.candidate.name not in has:
+            best.setdefault(r.candidate.name, r)
+    return [(r.candidate.attached, modest(r)) for r in best.values()]
+
+
+def modest(ranked: Ranked) -> Floats:
+    """(q,) numbers: amplitudes at their modest sizes, shapes as first order has them or where they begin."""
+    quantities = ranked.candidate.attached.effect.quantities
+    sizes = [q.scale if q.amplitude else (n if ranked.gain > 0 else q.start)
+             for q, n in zip(quantities, ranked.numbers, strict=True)]  # fmt: skip
+    return np.array(sizes)
