@@ -157,8 +157,8 @@ def race(parent: Hypothesis, starts: Sequence[tuple[Attached, Floats]]) -> list[
     """The best two of models with one more law each, fitted from the cell's first guess by successive halving.
 
     A simulator without a law has bent other parameters to stand for it, and from there a fit may end in a valley beside
-    the right one. All models are fitted to the beginning of some episodes, the better half of them to more of it, and so
-    on; the last ones to all there is. `starts`: each law with its (q,) numbers.
+    the right one. All models are fitted to the beginning of some episodes, the better half of them to more of it, and
+    so on; the last ones to all there is. `starts`: each law with its (q,) numbers.
     """
     count = len(parent.likelihood.inputs)
     rows = np.unique(np.linspace(0, count - 1, min(count, EPISODES)).astype(int))

@@ -118,8 +118,8 @@ def search(
 
 
 def calls_for_more(model: Hypothesis) -> bool:
-    """Whether what a model leaves still calls for a free discrepancy."""
-    return model.free.log - max(model.free.alone, model.log_evidence) + PRIOR_UNKNOWN > 0
+    """Whether what a model leaves is more probable with a discrepancy, its laws' own or a free one, than without."""
+    return max(model.log_evidence, model.free.log + PRIOR_UNKNOWN) > model.free.alone
 
 
 def promising(ranked: Sequence[Ranked], parent: Hypothesis) -> list[Ranked]:
