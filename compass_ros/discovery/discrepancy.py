@@ -60,7 +60,13 @@ def free(response: Response) -> Free:
     return Free(alone.log, log_sum(logs - np.log(len(logs))), best < len(FREE), found[best].pushes.reshape(shape))
 
 
-def with_law(response: Response, sizes: Floats) -> float:
-    """Log evidence of a model with laws; (S,) rms sizes of the laws along the fitted motion."""
+def with_law(response: Response, sizes: Floats) -> tuple[float, float]:
+    """Log evidence of a model with laws, and the posterior mean of rho, the discrepancy's size as a share of theirs.
+
+    Args:
+        sizes: (S,) rms of the laws along the fitted motion.
+    """
     found = evidences(response.tangent, [spread(response, rho * sizes) for rho in RHO])
-    return log_sum(np.array([f.log for f in found]) + np.log(RHO_PRIOR))
+    logs = np.array([f.log for f in found]) + np.log(RHO_PRIOR)
+    total = log_sum(logs)
+    return total, float(np.exp(logs - total) @ np.array(RHO))

@@ -25,7 +25,10 @@ from compass_ros.calibration.least_squares import robust_loss, robust_weight
 from compass_ros.types import Floats
 
 ROUNDS = 2
-"""How often weights are taken anew where residuals are beyond the scale of the robust loss."""
+"""How often weights are taken anew, as long as the bound rises by SLIGHT."""
+SLIGHT = 0.1
+ROUNDING = 1e-12
+"""Share of a column that sums over ten thousand rows in double precision leave open."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,13 +130,13 @@ class Factored:
         inner[:, :own_numbers, own_numbers:] = gram[:, own, hats] @ self._mixed
         inner[:, own_numbers:, :own_numbers] = inner[:, :own_numbers, own_numbers:].transpose(0, 2, 1)
         inner[:, own_numbers:, own_numbers:] = self._turned @ gram[:, hats, hats] @ self._mixed
-        self._factor = np.linalg.cholesky(inner + np.eye(own_numbers + q))
+        self._factor = _root(inner + np.eye(own_numbers + q))
         across = np.concatenate([gram[:, own, :p], self._turned @ gram[:, hats, :p]], axis=1)
         self._half = np.linalg.solve(self._factor, across)
         taken = np.einsum("eij,eik->jk", self._half, self._half)
         self.precision = gram[:, :p, :p].sum(axis=0) - taken + np.eye(p)
-        self._outer = np.linalg.cholesky(self.precision)
-        self._determinant = sum(
+        self._outer = _root(self.precision)
+        self.determinant = sum(
             float(np.log(np.diagonal(f, axis1=-2, axis2=-1)).sum()) for f in (self._factor, self._outer)
         )
 
@@ -147,7 +150,7 @@ class Factored:
         step = -np.linalg.solve(self._outer.T, np.linalg.solve(self._outer, pull))
         square = squares + np.sum(tangent.own_away**2) + np.sum(tangent.away**2)
         square = square - np.sum(half**2, axis=(0, 1)) + np.sum(pull * step, axis=0)
-        return -0.5 * (square + self._constant) - self._determinant, step, half
+        return -0.5 * (square + self._constant) - self.determinant, step, half
 
     def logs(self, last: Floats, squares: Floats) -> Floats:
         """(m,) log evidences of m residuals: (E, n, m) products of all columns with them, (m,) their squares."""
@@ -160,6 +163,16 @@ class Factored:
         within = -np.linalg.solve(self._factor.transpose(0, 2, 1), self._half @ step + half)
         push = self._mixed @ within[:, self._l :]
         return Solved(float(logs[0]), step[:, 0], within[:, : self._l, 0], push[..., 0], self.precision)
+
+
+def _root(matrix: Floats) -> Floats:
+    """Cholesky factor of (..., n, n) matrices whose rows may be of very different size.
+
+    Columns that are alike to ROUNDING hold each other as firmly as that.
+    """
+    scale = np.sqrt(np.diagonal(matrix, axis1=-2, axis2=-1))
+    unit = matrix / scale[..., :, None] / scale[..., None, :]
+    return np.asarray(np.linalg.cholesky(unit + ROUNDING * np.eye(unit.shape[-1])) * scale[..., :, None])
 
 
 def solve(tangent: Tangent, normal: Normal, spread: Floats | None) -> Solved:
@@ -177,12 +190,11 @@ def residual_of(tangent: Tangent, solved: Solved) -> Floats:
 def evidences(tangent: Tangent, spreads: list[Floats | None]) -> list[Solved]:
     """Of several discrepancies, each with the weights of the residuals that the best of them leaves."""
     found = [solve(tangent, tangent.normal, spread) for spread in spreads]
-    beyond = tangent.residual**2 > tangent.robust**2
-    for _ in range(ROUNDS if beyond.any() else 0):
+    for _ in range(ROUNDS):
         best = max(found, key=lambda s: s.log)
         normal = Normal.of(tangent, residual_of(tangent, best))
         again = [solve(tangent, normal, spread) for spread in spreads]
-        if max(s.log for s in again) < best.log + 0.1:
+        if max(s.log for s in again) < best.log + SLIGHT:
             break
         found = [max(pair, key=lambda s: s.log) for pair in zip(found, again, strict=True)]
     return found

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import lsq_linear, minimize
 
 from compass_ros.calibration.least_squares import robust_weight
 from compass_ros.discovery.candidates import Candidate
@@ -225,16 +225,13 @@ def _weights(response: Response) -> Floats:
 def best_sizes(matrix: Floats, pull: Floats, low: Floats, high: Floats, prior: Floats) -> tuple[Floats, float]:
     """(n,) amplitudes within bounds that lower the cost most, and by how much, with a Gaussian prior."""
     full = matrix + np.diag(1 / prior**2)
-    sizes, loose = np.zeros(len(pull)), np.ones(len(pull), bool)
-    for _ in range(len(pull) + 1):
-        sizes[loose] = -np.linalg.solve(
-            full[np.ix_(loose, loose)], pull[loose] + full[np.ix_(loose, ~loose)] @ sizes[~loose]
-        )
-        outside = loose & ((sizes < low) | (sizes > high))
-        if not outside.any():
-            break
-        sizes[outside] = np.clip(sizes[outside], low[outside], high[outside])
-        loose &= ~outside
+    sizes = -np.linalg.solve(full, pull)
+    if np.any((sizes < low) | (sizes > high)):
+        if len(pull) == 1:
+            sizes = np.clip(sizes, low, high)
+        else:
+            root = np.linalg.cholesky(full)
+            sizes = lsq_linear(root.T, -np.linalg.solve(root, pull), (low, high), method="bvls").x
     return sizes, -float(pull @ sizes + 0.5 * sizes @ full @ sizes)
 
 

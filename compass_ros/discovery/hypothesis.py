@@ -98,9 +98,18 @@ class Hypothesis:
         return free(self.response)
 
     @cached_property
+    def _with_law(self) -> tuple[float, float]:
+        return with_law(self.response, self.sizes)
+
+    @property
     def log_evidence(self) -> float:
         """With a discrepancy in proportion to its laws; without laws, with none."""
-        return with_law(self.response, self.sizes) if self.laws else self.free.alone
+        return self._with_law[0] if self.laws else self.free.alone
+
+    @property
+    def rho(self) -> float:
+        """Posterior mean of the discrepancy's size, as a share of the laws' own."""
+        return self._with_law[1] if self.laws else 0.0
 
 
 def widened(parent: Hypothesis, laws: Sequence[Attached]) -> tuple[Simulator, Likelihood]:

@@ -17,7 +17,7 @@ from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.hypothesis import Hypothesis, finished, from_parent, further, race
-from compass_ros.discovery.settings import PRIOR_LAW, PRIOR_UNKNOWN
+from compass_ros.discovery.settings import PRIOR_LAW, PRIOR_UNKNOWN, RHO, RHO_PRIOR
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
 
@@ -109,6 +109,8 @@ def search(
             break
         best, top = leader
         ranked = rank(FirstOrder(best.response), candidates)
+        if top + max(r.gain + prior.of_laws([r.candidate.name]) for r in ranked) < found.unknown:
+            break  # no law more could come up to a free discrepancy
     if not known:
         return found
     ordered = sorted(known.values(), key=lambda one: -one[1])
@@ -118,8 +120,10 @@ def search(
 
 
 def calls_for_more(model: Hypothesis) -> bool:
-    """Whether what a model leaves is more probable with a discrepancy, its laws' own or a free one, than without."""
-    return max(model.log_evidence, model.free.log + PRIOR_UNKNOWN) > model.free.alone
+    """Whether a model leaves something: it needs a free discrepancy, or one of its laws' larger than was expected."""
+    if model.free.log + PRIOR_UNKNOWN > model.log_evidence:
+        return True
+    return model.rho > float(np.dot(RHO, RHO_PRIOR))
 
 
 def promising(ranked: Sequence[Ranked], parent: Hypothesis) -> list[Ranked]:

@@ -96,6 +96,11 @@ def recorded(simulator: Simulator, laws: Sequence[Attached], numbers: Sequence[f
     return replace(plain, measured=wider.observe(values, inputs, plain.time_s))
 
 
+def noisy(likelihood: Likelihood, noise: Floats) -> Likelihood:
+    """The same recordings with (E, F, C) noise."""
+    return replace(likelihood, measured=likelihood.measured + noise)
+
+
 def space_of(simulator: Simulator, likelihood: Likelihood) -> Space:
     """Tangents at the defaults; no parameter is free to take anything."""
     point, free = start(likelihood, simulator.defaults), np.empty(0, np.int64)

@@ -1,0 +1,148 @@
+"""Log evidence against the dense Gaussian that it stands for, and against numerical integration of a robust loss."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import multivariate_normal
+
+from compass_ros.calibration.least_squares import robust_loss
+from compass_ros.discovery.evidence import Factored, Normal, Tangent, evidences, log_sum, residual_of, solve
+from compass_ros.types import Floats
+
+EPISODES, ROWS, PARAMETERS, OWN, PUSHES = 3, 40, 4, 2, 6
+WIDE = 1e6
+
+
+def drawn(seed: int, robust: float = WIDE, correlation_time: float = 1.0) -> Tangent:
+    """A linear model with everything by chance."""
+    rng = np.random.default_rng(seed)
+    rows = (EPISODES, ROWS)
+    return Tangent(
+        residual=rng.normal(size=rows),
+        parameters=rng.normal(size=(*rows, PARAMETERS)),
+        own=rng.normal(size=(*rows, OWN)),
+        pushes=rng.normal(size=(*rows, PUSHES)),
+        away=rng.normal(size=PARAMETERS),
+        own_away=rng.normal(size=(EPISODES, OWN)),
+        robust=robust,
+        correlation_time=correlation_time,
+    )
+
+
+def dense(tangent: Tangent, spread: Floats | None) -> tuple[Floats, Floats, Floats]:
+    """(N, m) what (m,) standard normal numbers do to all residuals, and the mean of those numbers."""
+    q = 0 if spread is None else spread.shape[-1]
+    count = PARAMETERS + EPISODES * (OWN + q)
+    columns, mean = np.zeros((EPISODES * ROWS, count)), np.zeros(count)
+    mean[:PARAMETERS] = tangent.away
+    for e in range(EPISODES):
+        rows, first = slice(e * ROWS, (e + 1) * ROWS), PARAMETERS + e * (OWN + q)
+        columns[rows, :PARAMETERS] = tangent.parameters[e]
+        columns[rows, first : first + OWN] = tangent.own[e]
+        mean[first : first + OWN] = tangent.own_away[e]
+        if spread is not None:
+            of_episode = np.broadcast_to(spread, (EPISODES, *spread.shape[-2:]))[e]
+            columns[rows, first + OWN : first + OWN + q] = tangent.pushes[e] @ of_episode
+    return columns, mean, tangent.residual.ravel()
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", ["none", "shared", "by episode"])
+@pytest.mark.parametrize("correlation_time", [1.0, 3.0])
+def test_log_evidence_is_that_of_the_gaussian(seed: int, kind: str, correlation_time: float) -> None:
+    tangent = drawn(seed, correlation_time=correlation_time)
+    rng = np.random.default_rng(100 + seed)
+    shape = {"none": None, "shared": (PUSHES, 5), "by episode": (EPISODES, PUSHES, 5)}[kind]
+    spread = None if shape is None else 0.3 * rng.normal(size=shape)
+    columns, mean, residual = dense(tangent, spread)
+    covariance = correlation_time * np.eye(len(residual)) + columns @ columns.T
+    expected = multivariate_normal.logpdf(residual, -columns @ mean, covariance)
+    constant = 0.5 * len(residual) * np.log(2 * np.pi * correlation_time)
+    assert solve(tangent, tangent.normal, spread).log == pytest.approx(expected + constant, abs=1e-8)
+
+
+def test_the_maximum_is_that_of_least_squares() -> None:
+    tangent, spread = drawn(5), 0.4 * np.random.default_rng(6).normal(size=(PUSHES, 5))
+    columns, mean, residual = dense(tangent, spread)
+    stacked = np.vstack([columns, np.eye(len(mean))])
+    best = np.linalg.lstsq(stacked, np.concatenate([-residual, mean]), rcond=None)[0]
+    found = solve(tangent, tangent.normal, spread)
+    assert found.parameters == pytest.approx(best[:PARAMETERS], abs=1e-9)
+    left = residual + columns @ best
+    assert residual_of(tangent, found).ravel() == pytest.approx(left, abs=1e-9)
+
+
+def test_many_residuals_at_once_are_as_each_alone() -> None:
+    tangent = drawn(7)
+    others = np.random.default_rng(8).normal(size=(4, EPISODES, ROWS))
+    factored = Factored(tangent, tangent.normal, None)
+    columns = np.concatenate([tangent.parameters, tangent.own, tangent.pushes], axis=2)
+    last = np.einsum("edn,med->enm", columns, others)
+    together = factored.logs(last, np.sum(others**2, axis=(1, 2)))
+    alone = [solve(t, t.normal, None).log for t in (replace(tangent, residual=r) for r in others)]
+    assert together == pytest.approx(alone, abs=1e-9)
+
+
+def test_a_parameter_that_says_nothing_costs_nothing() -> None:
+    tangent = drawn(9)
+    wider = tangent.more(np.zeros((EPISODES, ROWS, 2)), np.zeros(2))
+    assert solve(wider, wider.normal, None).log == pytest.approx(solve(tangent, tangent.normal, None).log, abs=1e-9)
+
+
+def test_a_parameter_that_explains_nothing_pays_for_its_prior() -> None:
+    """Occam's factor: half the log of one plus its information, where the residual has nothing of it."""
+    empty = replace(drawn(10), parameters=np.zeros((EPISODES, ROWS, 0)), away=np.zeros(0), own=np.zeros((EPISODES, ROWS, 0)))
+    empty = replace(empty, own_away=np.zeros((EPISODES, 0)))
+    column = np.random.default_rng(11).normal(size=empty.residual.shape)
+    column -= empty.residual * np.sum(column * empty.residual) / np.sum(empty.residual**2)
+    wider = empty.more(column[:, :, None], np.zeros(1))
+    paid = solve(empty, empty.normal, None).log - solve(wider, wider.normal, None).log
+    assert paid == pytest.approx(0.5 * np.log1p(np.sum(column**2)), abs=1e-9)
+
+
+@pytest.mark.parametrize("outlier", [0.0, 8.0, 30.0, 200.0])
+def test_of_a_robust_loss_it_is_a_lower_bound_that_comes_close(outlier: float) -> None:
+    """One parameter, one episode, some frames far away: against the integral itself."""
+    rng, robust = np.random.default_rng(12), 4.0
+    residual = rng.normal(size=(1, 30)) + 2.0
+    residual[0, ::7] += outlier
+    none = np.zeros((1, 30, 0))
+    tangent = Tangent(residual, np.ones((1, 30, 1)), none, none, np.zeros(1), np.zeros((1, 0)), robust, 1.0)
+
+    def cost(x: float) -> float:
+        return 0.5 * float(np.sum(robust_loss(residual + x, robust))) + 0.5 * x**2
+
+    least = min(cost(x) for x in np.linspace(-6, 2, 400))
+    integral = quad(lambda x: np.exp(least - cost(x)), -8, 4, limit=200)[0]
+    exact = float(np.log(integral / np.sqrt(2 * np.pi))) - least
+    found = evidences(tangent, [None])[0].log
+    assert found <= exact + 1e-6
+    assert found > exact - 0.7
+
+
+def test_weights_follow_what_a_discrepancy_explains() -> None:
+    """Frames that are far away without it and near with it count fully: the bound of the larger model is not loose."""
+    rng = np.random.default_rng(13)
+    rows, none = (1, 60), np.zeros((1, 60, 0))
+    push = np.repeat(np.eye(3), 20, axis=0)[None]
+    residual = (push @ np.array([40.0, -25.0, 30.0]))[..., 0] + rng.normal(size=rows)
+    tangent = Tangent(residual, none, none, push, np.zeros(0), np.zeros((1, 0)), 4.0, 1.0)
+    without, found = evidences(tangent, [None, 30.0 * np.eye(3)])
+    exact = replace(tangent, robust=WIDE)
+    assert found.log == pytest.approx(solve(exact, exact.normal, 30.0 * np.eye(3)).log, abs=3.0)
+    assert found.log > without.log + 100
+
+
+def test_normal_equations_know_the_constant_of_the_bound() -> None:
+    tangent = drawn(14, robust=2.0)
+    normal = Normal.of(tangent, tangent.residual)
+    weighted = float(normal.gram[:, -1, -1].sum()) + normal.constant
+    assert weighted == pytest.approx(float(np.sum(robust_loss(tangent.residual, 2.0))), abs=1e-9)
+
+
+def test_log_sum() -> None:
+    assert log_sum(np.log([0.2, 0.3, 0.5])) == pytest.approx(0.0, abs=1e-12)

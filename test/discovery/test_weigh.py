@@ -1,0 +1,97 @@
+"""Verdicts on a servo by one measure: what no law of the library is, two laws, and how often noise is taken for one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compass_ros.calibration.least_squares import Fit, Point, linearise
+from compass_ros.calibration.noise import Noise
+from compass_ros.config import CalibrationConfig
+from compass_ros.discovery.candidates import candidates
+from compass_ros.discovery.first_order import FirstOrder
+from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.search import Prior, rank, search
+from compass_ros.discovery.threshold import DRAWS, largest_odds
+from compass_ros.pipeline import calibrate
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import Attached, Effect, Quantity
+from compass_ros.simulation.effects.effect import Context
+from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.types import Floats
+from test.discovery.servo import recorded, servo
+from test.simulation import robots
+
+
+def _gust(numbers: Floats, context: Context) -> tuple[Term, ...]:
+    return tuple(Term(Kind.HAT, site, np.insert(numbers, 1, 0.0, axis=1)) for site in context.sites)
+
+
+GUST = Effect(
+    name="gust",
+    channel="dynamics",
+    quantities=(
+        Quantity("force", "N m", -10.0, 10.0, 0.1),
+        Quantity("moment", "s", 0.0, 10.0, 1.0, amplitude=False),
+        Quantity("half_width", "s", 0.01, 10.0, 1.0, amplitude=False, start=0.1),
+    ),
+    sentence="a gust",
+    on=("hinge", "slide"),
+    forces=_gust,
+)
+"""A push at one moment of each recording: no law of the library depends on time."""
+
+
+@pytest.mark.slow
+def test_a_push_at_a_moment_is_unknown_and_on_its_joint(tmp_path: Path) -> None:
+    cell = servo(tmp_path)
+    episodes = recorded(cell, [Attached(GUST, ("axis",))], [0.15, 0.7, 0.12])
+    mismatch = calibrate(episodes, cell, CalibrationConfig(threads=1))[0].mismatch
+    assert mismatch.verdict == "unknown", mismatch.sentence
+    assert mismatch.where is not None
+    assert mismatch.where.channel == "dynamics"
+    assert mismatch.explanations[0].laws[0].name == "unknown"
+    assert sum(e.probability for e in mismatch.explanations) == pytest.approx(1.0, abs=1e-3)
+
+
+def plain(folder: Path, seed: int) -> Hypothesis:
+    """An arm that swings, with white noise, at the fit of a simulator that lacks nothing."""
+    cell = robots.robot(folder, ("hinge", "hinge"))
+    simulator, inputs = Simulator(cell, threads=1), robots.shots(cell, 4)
+    likelihood = robots.recorded(simulator, [], [], inputs)
+    noise = np.random.default_rng(seed).normal(0, 1, likelihood.measured.shape) * likelihood.sigma
+    noisy = robots.noisy(likelihood, noise)
+    point, free = Point(simulator.defaults, np.zeros_like(inputs), 0.0), np.arange(len(simulator.parameters))
+    linear = linearise(noisy, point, free, np.full(len(free), 0.01))
+    return Hypothesis((), simulator, noisy, Fit(point, linear, free, 4.0, 0, True))
+
+
+def test_noise_seldom_exceeds_the_threshold(tmp_path: Path) -> None:
+    """Largest odds of sixty recordings without anything missing: as the bootstrap of the first of them says."""
+    model = plain(tmp_path, 0)
+    likelihood = model.likelihood
+    asked = candidates(model.simulator, model.response.values, likelihood.inputs, likelihood.time_s)
+    first, prior = rank(FirstOrder(model.response), asked), Prior.of(asked)
+    white = Noise(np.ones(likelihood.measured.shape[2]), 0.0)
+    odds = largest_odds(model.response, first, [prior.of_laws([f.candidate.name]) for f in first], white, 0)
+    assert odds.shape == (DRAWS,)
+    assert np.mean(odds > 0) < 0.01
+    again = largest_odds(model.response, first, [prior.of_laws([f.candidate.name]) for f in first], white, 0)
+    assert np.array_equal(odds, again)
+    found = search(model, first, asked, max(float(np.quantile(odds, 0.99)), 0.0), lambda *_: True)
+    assert not found.models
+    assert found.probabilities[0] > 0.9
+
+
+def test_prior_odds_are_shared_by_names_and_then_by_sites(tmp_path: Path) -> None:
+    model = plain(tmp_path, 1)
+    asked = candidates(model.simulator, model.response.values, model.likelihood.inputs, model.likelihood.time_s)
+    prior = Prior.of(asked)
+    total = sum(np.exp(prior.of_laws([c.name])) for c in asked)
+    assert total == pytest.approx(0.5)
+    assert prior.of_laws(["spring", "spring"]) == prior.of_laws(["spring"])
+    assert prior.of_laws(["spring", "coulomb_friction"]) == pytest.approx(
+        prior.of_laws(["spring"]) + prior.of_laws(["coulomb_friction"])
+    )
