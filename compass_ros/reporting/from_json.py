@@ -14,6 +14,8 @@ from compass_ros.types import (
     EffectFinding,
     EffectParameter,
     Evidence,
+    ExplainedLaw,
+    Explanation,
     Gap,
     Graph,
     LeftOut,
@@ -104,7 +106,20 @@ def _mismatch(said: Json) -> Mismatch:
         undetectable=tuple(said["undetectable"]),
         next_experiment=said["next_experiment"],
         sentence=said["sentence"],
+        explanations=tuple(_explanation(one) for one in said.get("explanations", ())),
+        false_alarm=_number(said.get("false_alarm")),
     )
+
+
+def _explanation(said: Json) -> Explanation:
+    laws = tuple(
+        ExplainedLaw(law["name"], tuple(law["sites"]), _quantities(law["quantities"])) for law in said["laws"]
+    )
+    return Explanation(laws, said["probability"], _number(said["log_evidence"]))
+
+
+def _quantities(said: Json) -> dict[str, EffectParameter]:
+    return {name: EffectParameter(_number(p["value"]), _number(p["std"]), p["unit"]) for name, p in said.items()}
 
 
 def _where(where: Json) -> Where:
@@ -120,10 +135,7 @@ def _where(where: Json) -> Where:
 
 def _effect(effect: Json) -> EffectFinding:
     evidence = effect["evidence"]
-    parameters = {
-        name: EffectParameter(_number(p["value"]), _number(p["std"]), p["unit"])
-        for name, p in effect["parameters"].items()
-    }
+    parameters = _quantities(effect["parameters"])
     return EffectFinding(
         effect["name"],
         parameters,

@@ -14,7 +14,17 @@ import jsonschema
 
 from compass_ros.errors import ConfigError
 from compass_ros.reporting.atomic import write_text
-from compass_ros.types import EffectFinding, Gap, Graph, Mismatch, ParameterRow, Result, Where
+from compass_ros.types import (
+    EffectFinding,
+    EffectParameter,
+    Explanation,
+    Gap,
+    Graph,
+    Mismatch,
+    ParameterRow,
+    Result,
+    Where,
+)
 
 SCHEMA_ID = "compass/result/1"
 
@@ -90,16 +100,28 @@ def _where(where: Where | None) -> dict[str, Any] | None:
 def _effect(effect: EffectFinding) -> dict[str, Any]:
     return {
         "name": effect.name,
-        "parameters": {
-            name: {"value": _number(p.value), "std": _number(p.std), "unit": p.unit}
-            for name, p in effect.parameters.items()
-        },
+        "parameters": _quantities(effect.parameters),
         "evidence": {
             "held_out_gain": _number(effect.evidence.held_out_gain),
             "log_evidence": _number(effect.evidence.log_evidence),
             "false_alarm_p": _number(effect.evidence.false_alarm_p),
         },
         "equivalents": list(effect.equivalents),
+    }
+
+
+def _quantities(quantities: Mapping[str, EffectParameter]) -> dict[str, Any]:
+    return {name: {"value": _number(p.value), "std": _number(p.std), "unit": p.unit} for name, p in quantities.items()}
+
+
+def _explanation(explanation: Explanation) -> dict[str, Any]:
+    return {
+        "laws": [
+            {"name": law.name, "sites": list(law.sites), "quantities": _quantities(law.quantities)}
+            for law in explanation.laws
+        ],
+        "probability": float(explanation.probability),
+        "log_evidence": _number(explanation.log_evidence),
     }
 
 
@@ -111,6 +133,8 @@ def _mismatch(mismatch: Mismatch) -> dict[str, Any]:
         "undetectable": list(mismatch.undetectable),
         "next_experiment": mismatch.next_experiment,
         "sentence": mismatch.sentence,
+        "explanations": [_explanation(explanation) for explanation in mismatch.explanations],
+        "false_alarm": _number(mismatch.false_alarm),
     }
 
 

@@ -95,8 +95,8 @@ def test_a_parameter_that_says_nothing_costs_nothing() -> None:
 
 def test_a_parameter_that_explains_nothing_pays_for_its_prior() -> None:
     """Occam's factor: half the log of one plus its information, where the residual has nothing of it."""
-    empty = replace(drawn(10), parameters=np.zeros((EPISODES, ROWS, 0)), away=np.zeros(0), own=np.zeros((EPISODES, ROWS, 0)))
-    empty = replace(empty, own_away=np.zeros((EPISODES, 0)))
+    none = np.zeros((EPISODES, ROWS, 0))
+    empty = replace(drawn(10), parameters=none, away=np.zeros(0), own=none, own_away=np.zeros((EPISODES, 0)))
     column = np.random.default_rng(11).normal(size=empty.residual.shape)
     column -= empty.residual * np.sum(column * empty.residual) / np.sum(empty.residual**2)
     wider = empty.more(column[:, :, None], np.zeros(1))

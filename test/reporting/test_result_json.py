@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from compass_ros.errors import ConfigError
+from compass_ros.reporting.from_json import from_json
 from compass_ros.reporting.result_json import read_result, schema, to_json, write_result
-from compass_ros.types import Gap, Graph, Result, Verdict
+from compass_ros.types import EffectParameter, ExplainedLaw, Explanation, Gap, Graph, Result, Verdict
 
 CONTRACT = {
     "": ("schema", "cell", "seed", "versions", "budget", "episodes", "gap", "parameters", "graph", "mismatch"),
@@ -208,3 +209,15 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, result: Result) -> N
     with pytest.raises(ConfigError, match="cannot be written"):
         write_result(result, path)
     assert [p.name for p in tmp_path.iterdir()] == ["result.json"]
+
+
+def test_explanations_read_back(make_result: Callable[[Verdict], Result]) -> None:
+    law = ExplainedLaw("coulomb_friction", ("elbow",), {"coefficient": EffectParameter(0.3, 0.01, "N m")})
+    unknown = ExplainedLaw("unknown", (), {})
+    explained = (Explanation((law,), 0.9, -12.5), Explanation((unknown,), 0.08, -15.0), Explanation((), 0.02, -18.0))
+    result = make_result("named")
+    result = replace(result, mismatch=replace(result.mismatch, explanations=explained, false_alarm=0.01))
+    content = json.loads(json.dumps(to_json(result)))
+    jsonschema.validate(content, schema())
+    assert from_json(content).mismatch.explanations == explained
+    assert from_json(content).mismatch.false_alarm == 0.01

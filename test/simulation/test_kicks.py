@@ -20,12 +20,14 @@ SHOT = np.array([[-0.206, -0.08, 0.163, 0.385]])
 COUNT = 12
 
 
-def pushed(simulator: Simulator, known: Kicks, inputs: Floats, time_s: Floats, case: tuple[int, int], by: float) -> Floats:
+def pushed(
+    simulator: Simulator, known: Kicks, inputs: Floats, time_s: Floats, case: tuple[int, int], by: float
+) -> Floats:
     """(E, F, C) change of what is observed per unit, from rollouts that begin at the moment with another velocity."""
     moment, dof = case
     values = np.tile(simulator.defaults, (len(inputs), 1))
     _, controls, steps = simulator.begun(values, inputs, time_s)
-    first = int(round(known.moments_s[moment] / simulator.time_step))
+    first = round(known.moments_s[moment] / simulator.time_step)
     model = simulator.physics.model
     ends = []
     for sign in (1.0, -1.0):
