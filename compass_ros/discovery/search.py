@@ -95,17 +95,19 @@ def search(
             if h.name not in known or odds > known[h.name][1]:
                 known[h.name] = (h, odds)
 
+    price = max(prior.of_laws([name]) for name in prior.sites)
     best, top, ranked = plain, 0.0, list(first)
     while True:
         tried = [from_parent(best, r, STEPS) for r in promising(ranked, best)[:RACED]]
         tried.sort(key=lambda h: -h.log_evidence)
         take(tried)
-        take(further(h, STEPS) for h in tried[: (len(tried) + 1) // 2])
-        if not known or calls_for_more(max(known.values(), key=lambda one: one[1])[0]):
+        within = [h for h in tried[: (len(tried) + 1) // 2] if h is tried[0] or h.free.log > tried[0].log_evidence]
+        take(further(h, STEPS) for h in within)
+        if not known or calls_for_more(max(known.values(), key=lambda one: one[1])[0], price):
             take(race(best, cold_starts(ranked, best)))
         leader = max(known.values(), key=lambda one: one[1])
         tell("fit effects", min(0.3 + 0.2 * len(leader[0].laws), 0.9))
-        if leader[1] <= top or not calls_for_more(leader[0]):
+        if leader[1] <= top or not calls_for_more(leader[0], price):
             break
         best, top = leader
         ranked = rank(FirstOrder(best.response), candidates)
@@ -119,9 +121,10 @@ def search(
     return Found(plain, found.unknown, tuple(h for h, _ in ordered), tuple(o for _, o in ordered), tuple(first))
 
 
-def calls_for_more(model: Hypothesis) -> bool:
-    """Whether a model leaves something: it needs a free discrepancy, or one of its laws' larger than was expected."""
-    if model.free.log + PRIOR_UNKNOWN > model.log_evidence:
+def calls_for_more(model: Hypothesis, price: float) -> bool:
+    """Whether a model leaves something: a free discrepancy gains more than the prior odds of one law more cost, or one
+    of its laws' own is larger than was expected."""
+    if model.free.log + (price if model.laws else PRIOR_UNKNOWN) > model.log_evidence:
         return True
     return model.rho > float(np.dot(RHO, RHO_PRIOR))
 
