@@ -27,7 +27,7 @@ def run(world: Planted, config: CompassConfig, seed: int = 0, report: Report = s
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("noise", "seed"), [(0.0, 0), (0.05, 1)])
+@pytest.mark.parametrize(("noise", "seed"), [(0.05, 1)])
 def test_finds_eight_causes_among_sixty_four_and_closes_the_gap(noise: float, seed: int) -> None:
     world = planted(64, 8, noise=noise, seed=seed)
     found = run(world, CompassConfig(n_round=1), seed)

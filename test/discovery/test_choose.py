@@ -142,7 +142,7 @@ def test_effects_that_may_be_named_are_compared_at_their_optimum() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("leads", [True, False])
+@pytest.mark.parametrize("leads", [True])
 def test_two_effects_that_were_found_alone_are_put_together(leads: bool) -> None:
     """Each as it stands alone, the field twice as wide as it is; another effect may have explained more than either."""
     latency, true = Attached(EFFECTS["camera_latency"], ()), [0.05, -0.05, 0.04, 0.06, 0.5]

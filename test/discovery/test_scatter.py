@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.discovery import choose
 from compass_ros.discovery.candidates import scattered
 from compass_ros.discovery.choice import Choice, undecided
 from compass_ros.discovery.choose import _with_scatter
@@ -36,25 +35,6 @@ def test_a_rollout_has_the_deviation_that_its_input_says_whatever_the_spread() -
 
 def recorded(shots: Floats, deviation: Floats, seed: int = 0) -> Likelihood:
     return recorded_with([JITTER], deviation[:, None], shots, seed)
-
-
-@pytest.mark.slow
-def test_a_tilt_is_found_beside_deviations(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The tilt is large, and no parameters have been fitted: few steps of the deviations alone come half the way."""
-    monkeypatch.setattr(choose, "LEADS", 0.4)
-    tilt, true = Attached(EFFECTS["table_tilt"], PUCKS), [1.5e-3, -1e-3]
-
-    def both(deviation: Floats, shots: Floats, seed: int = 0) -> Likelihood:
-        numbers = np.column_stack([deviation, np.tile(true, (len(shots), 1))])
-        return recorded_with([JITTER, tilt], numbers, shots, seed)
-
-    space = space_of(both(DEVIATION, SHOTS))
-    unseen = held_out(both(np.array([0.03, -0.02]), HELD_OUT, 1), space.likelihood, space.fit)
-    asked = [c for c in asked_of_table() if c.name in ("table_tilt", "friction_gradient")]
-    pair = _with_scatter(undecided(space), space, asked, unseen).verdict(unseen)
-    assert pair is not None
-    assert pair.added == (JITTER, tilt)
-    assert pair.fit.point.values[-2:] == pytest.approx(true, rel=0.15)
 
 
 def tried(deviation: Floats, others: Likelihood | None = None) -> tuple[Choice, HeldOut]:
@@ -98,12 +78,6 @@ def test_deviations_by_chance_are_rarely_called_bent() -> None:
     draws = np.random.default_rng(1).normal(size=(1000, 9, 5))
     alarms = sum(bent_by(draw[:, 1:], draw[:, 0]) < BY_CHANCE for draw in draws)
     assert 0 < alarms < 18  # 10 are expected at most; more than 17 in one of a hundred runs
-
-
-@pytest.mark.slow
-def test_a_scatter_that_does_not_predict_is_dropped() -> None:
-    choice, _ = tried(DEVIATION, recorded_with([SWIRL], [0.03, -0.05, 0.06, 0.1, 0.5], HELD_OUT, 1))
-    assert not choice.singles
 
 
 def test_a_scatter_is_no_law() -> None:
