@@ -11,7 +11,7 @@ import numpy as np
 
 from compass_ros.cells.signals import Signal, of_object, of_spec
 from compass_ros.cells.spec import CellSpec, FactorSpec, ObjectSpec
-from compass_ros.cells.start import StartSpec, first_state, input_names, input_std
+from compass_ros.cells.start import StartSpec, first_state, form_error, input_names, input_std
 from compass_ros.errors import ConfigError, nearest
 from compass_ros.types import ActionField, Bools, Episode, Floats, Parameter
 
@@ -144,12 +144,13 @@ class Cell:
         return np.array(std + [0.0] * bool(self.spec.inputs))
 
     def stated_std(self, episode: Episode) -> Floats:
-        """(A,) the same as the recording says it; 0 where it says nothing."""
+        """(A,) the same as the recording says it, or its first frames beside what the cell states; 0: nothing."""
         std, at = np.zeros(len(self.input_names)), len(self.action)
         for spec in self.starts:
-            stated = episode.initial_std.get(spec.object, ())
+            signal = self.signal(spec.object)
+            stated = episode.initial_std.get(spec.object, ()) or form_error(spec, signal, episode)
             std[at : at + len(stated)] = stated
-            at += len(input_names(spec, self.signal(spec.object)))
+            at += len(input_names(spec, signal))
         return std
 
     def simulated_time(self, inputs: Floats, time_s: Floats) -> Floats:

@@ -126,18 +126,9 @@ def _unit(quaternion: Floats, spec: StartSpec, episode: Episode) -> Floats:
 
 def _from_track(spec: StartSpec, quantity: Quantity, episode: Episode, stated: Floats) -> Floats:
     """First state from the first frames: the line through them, or the parabola where there are at least five."""
-    known = {track.object: track for track in episode.tracks}
-    if spec.object not in known:
-        raise DataError(f"{episode.source or episode.name}: no initial state and no track of {spec.object}")
-    track: Track = known[spec.object]
-    after = np.flatnonzero(track.stamp_ns >= episode.start_ns)[: spec.frames]
-    if len(after) < 2:
-        raise DataError(f"{episode.source or episode.name}: fewer than 2 frames of {spec.object} after the start")
-    time = (track.stamp_ns[after] - episode.start_ns) * _NS
-    value = track.value[after]
+    time, value = _beginning(spec, episode)
     linear = value[:, :3] if quantity == "pose" else value
-    powers = np.vander(time, 3 if len(after) >= 5 else 2, increasing=True)
-    fit = np.linalg.lstsq(powers, linear, rcond=None)[0]
+    fit = _through(time, linear, 3 if len(time) >= 5 else 2)
     at_rest = spec.velocity == "rest"
     first = np.concatenate([linear[0] if at_rest else fit[0], value[0, linear.shape[1] :]])
     position = stated if len(stated) else first
@@ -146,6 +137,43 @@ def _from_track(spec: StartSpec, quantity: Quantity, episode: Episode, stated: F
     if quantity == "pose":
         rate = np.zeros(3) if at_rest else _angular_velocity(time, value[:, 3:])
     return np.concatenate([position, velocity, rate])
+
+
+def _beginning(spec: StartSpec, episode: Episode) -> tuple[Floats, Floats]:
+    """(n,) times [s] and (n, D) values of the first frames. Raises DataError where there are none."""
+    known = {track.object: track for track in episode.tracks}
+    if spec.object not in known:
+        raise DataError(f"{episode.source or episode.name}: no initial state and no track of {spec.object}")
+    track: Track = known[spec.object]
+    after = np.flatnonzero(track.stamp_ns >= episode.start_ns)[: spec.frames]
+    if len(after) < 2:
+        raise DataError(f"{episode.source or episode.name}: fewer than 2 frames of {spec.object} after the start")
+    return (track.stamp_ns[after] - episode.start_ns) * _NS, track.value[after]
+
+
+def _through(time: Floats, value: Floats, numbers: int) -> Floats:
+    """(numbers, D) coefficients of the polynomial in time through (n, D) values, by least squares."""
+    return np.asarray(np.linalg.lstsq(np.vander(time, numbers, increasing=True), value, rcond=None)[0])
+
+
+def form_error(spec: StartSpec, signal: Signal, episode: Episode) -> Floats:
+    """(A,) error of the first state that a track says, beside what the cell states: no motion is a parabola.
+
+    What a cubic through the same frames says differently; zero where the recording states the first state, or where too
+    few frames say it. Of a pose's turn nothing is known.
+    """
+    out = np.zeros(len(_names(signal)))
+    if spec.velocity == "rest" or len(episode.initial_state.get(spec.object, ())) == len(state_names(signal)):
+        return out
+    time, value = _beginning(spec, episode)
+    linear = value[:, :3] if signal.quantity == "pose" else value
+    if len(time) < 6:
+        return out
+    apart = np.abs(_through(time, linear, 4)[:2] - _through(time, linear, 3)[:2])
+    first = positions_in_state(signal)
+    out[: linear.shape[1]] = 0.0 if episode.initial_state.get(spec.object) else apart[0]
+    out[first : first + linear.shape[1]] = apart[1]
+    return out
 
 
 def _angular_velocity(time: Floats, quaternion: Floats) -> Floats:

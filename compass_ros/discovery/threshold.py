@@ -26,22 +26,14 @@ DRAWS = 200
 def largest_odds(
     response: Response, ranked: Sequence[Ranked], priors: Sequence[float], noise: Noise, seed: int
 ) -> Floats:
-    """(DRAWS,) largest log posterior odds against the plain model, in recordings of it.
+    """(DRAWS,) largest log posterior odds against the plain model, in recordings simulated from it.
 
     `priors`: log prior odds of each ranked law.
     """
     tangent = response.tangent
     weight = robust_weight(tangent.residual, tangent.robust)
-    rng = np.random.default_rng(seed)
-    shape = response.likelihood.measured.shape
-    seen = ~np.isnan(response.likelihood.measured)
-    draws = np.stack(
-        [
-            np.where(seen, correlated(rng.standard_normal(shape), noise.correlation), 0.0).reshape(shape[0], -1)
-            for _ in range(DRAWS)
-        ],
-        axis=2,
-    )
+    rng, rows = np.random.default_rng(seed), tangent.residual.shape
+    draws = np.stack([simulated(response, noise, rng).reshape(rows) for _ in range(DRAWS)], axis=2)
     weighted = draws * (weight / tangent.correlation_time)[:, :, None]
     squares = np.einsum("edm,edm->m", weighted, draws)
     still = np.zeros_like(tangent.away), np.zeros_like(tangent.own_away)
@@ -62,3 +54,26 @@ def largest_odds(
         more = np.concatenate([last[:, :p], products(one.columns), last[:, p:]], axis=1)
         best = np.maximum(best, Factored(wider, wider.normal, None).logs(more, squares) - plain + prior)
     return np.asarray(best)
+
+
+def simulated(response: Response, noise: Noise, rng: np.random.Generator) -> Floats:
+    """(E, F, C) residuals [sigma] of recordings of the plain model at its fit; 0 where nothing was measured.
+
+    An encoder counts: its error is what the fitted motion makes of whole steps from a zero that nobody knows, and not
+    white. What else there is of noise has the recordings' own correlation.
+    """
+    likelihood, linear = response.likelihood, response.fit.linear
+    shape = likelihood.measured.shape
+    seen = ~np.isnan(likelihood.measured)
+    white = correlated(rng.standard_normal(shape), noise.correlation)
+    if noise.step is None:
+        return np.where(seen, white, 0.0)
+    step = noise.step
+    counts = step > 0
+    fitted = np.where(seen, likelihood.measured + linear.residual * likelihood.sigma, 0.0)
+    rest = np.sqrt(np.maximum(noise.sigma**2 - step**2 / 12, 0.0))
+    true = fitted + rng.uniform(-0.5, 0.5, shape[2]) * step
+    size = np.where(counts, step, 1.0)
+    read = size * np.round((true + rest * white) / size)
+    error = np.where(counts, true - read, white * likelihood.sigma)
+    return np.where(seen, error / likelihood.sigma, 0.0)

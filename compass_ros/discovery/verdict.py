@@ -57,23 +57,33 @@ class Judge:
 
     def discovery(self) -> Discovery:
         """The verdict with all that goes with it."""
-        none, unknown, of_models = self.found.probabilities
+        unknown, of_models = self.found.probabilities[1:]
         best = max([self.found.unknown, *self.found.odds], default=-np.inf)
         if best <= self.threshold:
             return self._none()
-        chosen = self._smallest(none, unknown, of_models)
-        models = [self.found.models[i] for i in chosen if i >= 0]
+        models = self._explaining(of_models)
         if not models or unknown > 0.5:
             return self._unknown()
-        verdict: Verdict = "named" if len(chosen) == 1 else "ambiguous"
-        return self._named(models, verdict)
+        return self._named(models, "named" if len(models) == 1 else "ambiguous")
 
-    def _smallest(self, none: float, unknown: float, of_models: Floats) -> list[int]:
-        """Indices of the smallest set of models with probability 1 - alpha; -1: `unknown`, -2: none."""
-        p = np.array([none, unknown, *of_models])
-        order = np.argsort(-p, kind="stable")
-        count = int(np.searchsorted(np.cumsum(p[order]), 1 - self.alpha)) + 1
-        return [int(i) - 2 if i >= 2 else (-1 if i == 1 else -2) for i in order[:count]]
+    def _explaining(self, of_models: Floats) -> list[Hypothesis]:
+        """The smallest set of models that holds 1 - alpha, the most probable first.
+
+        A law that all of them share is sure, whatever else may be: where models with exactly the laws that are sure
+        (posterior inclusion probability, Barbieri and Berger 2004) were fitted, the set is one of these.
+        """
+        names = [frozenset(a.effect.name for a in m.laws) for m in self.found.models]
+        sure = frozenset(
+            name
+            for name in frozenset[str]().union(*names)
+            if sum(p for p, own in zip(of_models, names, strict=True) if name in own) >= 1 - self.alpha
+        )
+        chosen = [i for i, own in enumerate(names) if own == sure] if sure else []
+        order = sorted(chosen or range(len(names)), key=lambda i: -of_models[i])
+        of_order = np.array([of_models[i] for i in order])
+        held = np.cumsum(of_order) / (of_order.sum() if chosen else 1.0)
+        count = int(np.searchsorted(held, 1 - self.alpha)) + 1
+        return [self.found.models[i] for i in order[:count]]
 
     def _none(self) -> Discovery:
         numbers = f"held-out error {1e3 * self._before:.2f} {self._unit}, noise {1e3 * self._floor:.2f} {self._unit}"

@@ -144,12 +144,12 @@ class Simulator:
     def launch_std(self, values: Floats, stated: Floats | None = None) -> Floats:
         """(A,) standard deviation of each of these inputs around what was commanded, at (P,) values.
 
-        `stated`: what the recordings say (`Recordings.start_std`) where the cell leaves it to them.
+        `stated`: what the recordings say (`Recordings.start_std`), beside the cell or where it leaves it to them.
         """
         own = [n[0, 0] for a, n in self.physics.of_effects(values[None]) if a.effect.scattered]
-        of_cell = self.cell.launch_std
-        left = np.isnan(of_cell)
-        return np.append(np.where(left, 0.0 if stated is None else stated, of_cell), own)
+        of_cell, said = self.cell.launch_std, 0.0 if stated is None else stated
+        beside = np.where(of_cell > 0, np.hypot(of_cell, said), of_cell)
+        return np.append(np.where(np.isnan(of_cell), said, beside), own)
 
     @property
     def time_step(self) -> float:

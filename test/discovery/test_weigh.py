@@ -14,7 +14,7 @@ from compass_ros.discovery.candidates import candidates
 from compass_ros.discovery.first_order import FirstOrder
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.search import Prior, rank, search
-from compass_ros.discovery.threshold import DRAWS, largest_odds
+from compass_ros.discovery.threshold import DRAWS, largest_odds, simulated
 from compass_ros.pipeline import calibrate
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, Effect, Quantity
@@ -95,3 +95,20 @@ def test_prior_odds_are_shared_by_names_and_then_by_sites(tmp_path: Path) -> Non
     assert prior.of_laws(["spring", "coulomb_friction"]) == pytest.approx(
         prior.of_laws(["spring"]) + prior.of_laws(["coulomb_friction"])
     )
+
+
+def test_recordings_of_an_encoder_are_simulated_in_whole_steps(tmp_path: Path) -> None:
+    """Fitted motion less error is a multiple of a step from a common zero; white noise where nothing counts."""
+    model, step = plain(tmp_path, 2), 2e-3
+    likelihood, linear = model.likelihood, model.fit.linear
+    shape = likelihood.measured.shape
+    counts = Noise(np.full(shape[2], step / np.sqrt(12)), 0.0, np.full(shape[2], step))
+    error = simulated(model.response, counts, np.random.default_rng(0)) * likelihood.sigma
+    read = likelihood.measured + linear.residual * likelihood.sigma - error
+    for column in range(shape[2]):
+        phase = read[..., column] / step
+        turns = np.exp(2j * np.pi * phase)
+        assert abs(turns.mean()) > 0.999999
+    assert np.abs(error).max() <= step
+    white = simulated(model.response, Noise(np.ones(shape[2]), 0.0), np.random.default_rng(0))
+    assert white.std() == pytest.approx(1.0, abs=0.05)
