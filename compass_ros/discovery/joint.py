@@ -54,6 +54,11 @@ class Joint:
         return "+".join(sorted(a.effect.name for a in self.added))
 
     @property
+    def laws(self) -> tuple[Attached, ...]:
+        """The same, as `next_shot.Rival` has them."""
+        return self.added
+
+    @property
     def stands_in(self) -> bool:
         """Whether a shape is not what the effect's name says: it stands for something else.
 

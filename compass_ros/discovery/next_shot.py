@@ -11,15 +11,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from types import MappingProxyType
+from typing import Protocol
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import normal_equations
+from compass_ros.calibration.least_squares import Fit, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.discovery.joint import Joint
 from compass_ros.discovery.planned import drawn
 from compass_ros.simulation import Simulator
-from compass_ros.simulation.effects import EFFECTS
+from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.simulation.sites import JOINTS
 from compass_ros.types import Floats
 
@@ -63,6 +63,21 @@ OF_JOINTS: Mapping[frozenset[str], str] = MappingProxyType(
 """The same where only joints are tracked."""
 
 
+class Rival(Protocol):
+    """A fitted model with laws."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def laws(self) -> tuple[Attached, ...]: ...
+    @property
+    def simulator(self) -> Simulator: ...
+    @property
+    def likelihood(self) -> Likelihood: ...
+    @property
+    def fit(self) -> Fit: ...
+
+
 @dataclass(frozen=True)
 class NextExperiment:
     """What to record next."""
@@ -75,7 +90,7 @@ class NextExperiment:
 
 
 def next_experiment(
-    simulator: Simulator, likelihood: Likelihood, rivals: Sequence[Joint], seed: int, pool: int = POOL
+    simulator: Simulator, likelihood: Likelihood, rivals: Sequence[Rival], seed: int, pool: int = POOL
 ) -> NextExperiment:
     """The shot that tells most pairs of two or more rival models apart, and by most; or what is no shot.
 
@@ -106,7 +121,7 @@ def next_experiment(
     return NextExperiment(sentence, action, float(least[best]))
 
 
-def _predictions(rival: Joint, shots: Floats, sigma: Floats, duration: float, rng: np.random.Generator) -> Floats:
+def _predictions(rival: Rival, shots: Floats, sigma: Floats, duration: float, rng: np.random.Generator) -> Floats:
     """(1 + DRAWS, S, D) predictions [sigma] at the best values, and at draws from the posterior."""
     fit, likelihood = rival.fit, rival.likelihood
     hessian, _ = normal_equations(likelihood, fit.point, fit.linear, fit.free, fit.robust)
@@ -135,7 +150,7 @@ def _apart(one: Floats, other: Floats) -> Floats:
 def _sentence(
     simulator: Simulator,
     action: Mapping[str, float],
-    rivals: Sequence[Joint],
+    rivals: Sequence[Rival],
     pairs: Sequence[tuple[int, int]],
     apart: Floats,
 ) -> str:
@@ -148,7 +163,7 @@ def _sentence(
     return f"Play the shot {shot}: it tells {', '.join(told)}."
 
 
-def _sentence_other(rivals: Sequence[Joint], pairs: Sequence[tuple[int, int]]) -> str:
+def _sentence_other(rivals: Sequence[Rival], pairs: Sequence[tuple[int, int]]) -> str:
     parts = [
         f"No shot tells {rivals[a].name} from {rivals[b].name}: {other_than_a_shot(rivals[a], rivals[b])}."
         for a, b in pairs
@@ -156,9 +171,9 @@ def _sentence_other(rivals: Sequence[Joint], pairs: Sequence[tuple[int, int]]) -
     return " ".join(parts)
 
 
-def other_than_a_shot(one: Joint, other: Joint) -> str:
+def other_than_a_shot(one: Rival, other: Rival) -> str:
     """What tells two models apart that no shot does."""
-    names = {a.effect.name for a in one.added} ^ {a.effect.name for a in other.added}
+    names = {a.effect.name for a in one.laws} ^ {a.effect.name for a in other.laws}
     joints = all(site.kind in JOINTS for site in one.simulator.moving.values())
     if not names:
         return _ONE_AT_A_TIME if joints else _ALONE

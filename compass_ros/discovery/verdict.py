@@ -11,9 +11,9 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import with_launches
 from compass_ros.calibration.residuals import covariance, jackknife
-from compass_ros.discovery.design import next_experiment
 from compass_ros.discovery.finding import Discovery, Tried
 from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.next_shot import next_experiment
 from compass_ros.discovery.search import Found
 from compass_ros.discovery.where import left_by, residual_map, whereabouts
 from compass_ros.discovery.words import errors, place, value_of, where_of
