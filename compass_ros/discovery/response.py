@@ -124,10 +124,18 @@ def respond(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> Response:
     model = simulator.physics.model
     speeds = unit_kicks.states[..., 1 + model.nq : 1 + model.nq + model.nv][..., dofs]
     accelerations = np.sqrt(np.mean(np.diff(speeds, axis=1) ** 2, axis=(0, 1))) / spacing
-    motion = np.nanstd(likelihood.measured, axis=1)
-    unit = np.concatenate([accelerations, np.nan_to_num(np.sqrt(np.nanmean(motion**2, axis=0)))])
+    unit = np.concatenate([accelerations, motion(likelihood)])
     rows = (len(inputs), seen[0].size, len(unit_kicks.moments_s), len(unit))
     return Response(simulator, likelihood, fit, unit_kicks, sites, site_of, inertia, unit, pushes.reshape(rows))
+
+
+def motion(likelihood: Likelihood) -> Floats:
+    """(C,) root mean square of what each column moves within an episode; 0 where it was not measured."""
+    seen = ~np.isnan(likelihood.measured)
+    count = np.maximum(seen.sum(axis=1, keepdims=True), 1)
+    values = np.where(seen, likelihood.measured, 0.0)
+    away = np.where(seen, values - values.sum(axis=1, keepdims=True) / count, 0.0)
+    return np.asarray(np.sqrt(np.mean(np.sum(away**2, axis=1) / count[:, 0], axis=0)))
 
 
 def readings(likelihood: Likelihood, moments: Floats) -> Floats:
