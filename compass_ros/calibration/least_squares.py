@@ -139,6 +139,25 @@ def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats, o
     return Linear(residual[0], jacobian, launch, same.reshape(columns, episodes)[1 : 1 + len(free)].T)
 
 
+def extended(old: Linear, likelihood: Likelihood, point: Point, residual: Floats, free: Ints) -> Linear:
+    """Differences that are known of the first of the `free` parameters, with those of the others taken at a point.
+
+    `residual`: (E, F, C) there.
+    """
+    new = free[old.jacobian.shape[-1] :]
+    episodes = len(likelihood.inputs)
+    steps = inward(likelihood, point, new, np.full(len(new), FIRST_STEP))
+    values = np.tile(point.values, (len(new), 1))
+    values[np.arange(len(new)), new] += steps
+    index = np.tile(np.arange(episodes), len(new))
+    inputs = np.tile(likelihood.inputs + point.launch, (len(new), 1))
+    there = likelihood.residual(np.repeat(values, episodes, axis=0), inputs, index)
+    change = there.reshape(len(new), *residual.shape) - residual
+    scaled = np.moveaxis(change * (likelihood.prior_std[new] / steps)[:, None, None, None], 0, -1)
+    onset = np.concatenate([old.onset, np.zeros((episodes, len(new)))], axis=1)
+    return Linear(residual, np.concatenate([old.jacobian, scaled], axis=-1), old.launch_jacobian, onset)
+
+
 def central(likelihood: Likelihood, point: Point, free: Ints, steps: Floats, onset: Floats | None = None) -> Linear:
     """The same with central differences: exact to second order, for twice the rollouts."""
     up = linearise(likelihood, point, free, steps, onset)

@@ -71,6 +71,13 @@ def jackknife(likelihood: Likelihood, fit: Fit) -> Floats:
     return np.asarray((episodes - 1) / episodes * away.T @ away)
 
 
+def variances(likelihood: Likelihood, fit: Fit) -> Floats:
+    """(p,) of the free parameters, in the prior's: what the noise leaves, or what the episodes disagree on if more."""
+    of_noise = np.diag(covariance(likelihood, fit))[: len(fit.free)]
+    of_episodes = np.minimum(np.diag(jackknife(likelihood, fit)), 1.0)  # the prior's at most
+    return np.maximum(of_noise, of_episodes)
+
+
 def _part_of(likelihood: Likelihood, fit: Fit, episode: int) -> tuple[Floats, Floats]:
     """(p, p) and (p,) one episode's part of the normal equations, its launch solved for; without the prior."""
     own, p, known = np.array([episode]), len(fit.free), fit.linear

@@ -45,19 +45,19 @@ class Free:
     """Of the same with a free discrepancy, of forces or of signals."""
     of_forces: bool
     """Which of the two has the higher evidence."""
-    mean: Floats
-    """(E, K, S) posterior mean of the discrepancy at its most probable size."""
 
 
 def free(response: Response) -> Free:
     """The model of a response with a discrepancy of any size, of forces or of signals."""
-    kinds = [response.unit * response.forces, response.unit * (1 - response.forces)]
-    sizes = [s * kind for kind in kinds for s in FREE]
-    alone, *found = evidences(response.tangent, [None, *(spread(response, s) for s in sizes)])
+    alone, *found = evidences(response.tangent, [None, *(spread(response, size) for size in free_sizes(response))])
     logs = np.array([f.log for f in found])
-    best = int(np.argmax(logs))
-    shape = (len(response.tangent.residual), len(response.kicks.moments_s), len(response.unit))
-    return Free(alone.log, log_sum(logs - np.log(len(logs))), best < len(FREE), found[best].pushes.reshape(shape))
+    return Free(alone.log, log_sum(logs - np.log(len(logs))), int(np.argmax(logs)) < len(FREE))
+
+
+def free_sizes(response: Response) -> list[Floats]:
+    """(S,) sizes that a discrepancy without a law may have, equally probable: of forces first, then of signals."""
+    kinds = [response.unit * response.forces, response.unit * (1 - response.forces)]
+    return [size * kind for kind in kinds for size in FREE]
 
 
 def with_law(response: Response, sizes: Floats) -> tuple[float, float]:

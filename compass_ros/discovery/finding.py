@@ -11,7 +11,8 @@ import numpy as np
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import Refined, with_launches
-from compass_ros.calibration.residuals import covariance, jackknife
+from compass_ros.calibration.residuals import variances
+from compass_ros.cells import Cell
 from compass_ros.discovery.choice import Choice
 from compass_ros.discovery.floor import EVERYWHERE, UNEXPLAINED, left_over, shown_noise
 from compass_ros.discovery.formula import Proposal, propose
@@ -80,6 +81,13 @@ def fit_failed(reason: str) -> Discovery:
 def data_bad(sentence: str) -> Discovery:
     """No verdict, for the recordings are wrong."""
     return Discovery(Mismatch("data_bad", None, (), (), "", sentence))
+
+
+def held_out_error(cell: Cell, judged: Likelihood, values: Floats) -> float:
+    """rms distance on held-out episodes [m or rad], each with the launch that agrees best with it."""
+    inputs = judged.inputs + with_launches(judged, values).launch
+    predicted = judged.predict(np.tile(values, (len(inputs), 1)), inputs, judged.time_s)
+    return rms_distance(cell, judged.difference(predicted, judged.measured))
 
 
 @dataclass(frozen=True)
@@ -191,11 +199,7 @@ class Finding:
         )
 
     def _held_out(self, likelihood: Likelihood, values: Floats) -> float:
-        """rms distance on held-out episodes [m], each with the launch that agrees best with it."""
-        judged = likelihood.on(self.judge)
-        inputs = judged.inputs + with_launches(judged, values).launch
-        predicted = judged.predict(np.tile(values, (len(inputs), 1)), inputs, judged.time_s)
-        return rms_distance(self.simulator.cell, judged.difference(predicted, judged.measured))
+        return held_out_error(self.simulator.cell, likelihood.on(self.judge), values)
 
     def _floor(self, noise: Noise) -> float:
         return rms_distance(self.simulator.cell, noise.rms[None, None])
@@ -236,10 +240,7 @@ class Finding:
         std = joint.likelihood.prior_std.copy()
         free = joint.fit.free
         of_effects = free >= len(self.simulator.cell.parameters)
-        of_noise = np.diag(covariance(joint.likelihood, joint.fit))[: len(free)]
-        of_episodes = np.minimum(np.diag(jackknife(joint.likelihood, joint.fit)), 1.0)  # the prior's at most
-        variance = np.maximum(of_noise, of_episodes)
-        std[free] *= np.sqrt(variance + np.where(of_effects, shift(joint), 0.0) ** 2)
+        std[free] *= np.sqrt(variances(joint.likelihood, joint.fit) + np.where(of_effects, shift(joint), 0.0) ** 2)
         of_spreads = spreads(joint)
         std[of_spreads] = joint.fit.point.values[of_spreads] / np.sqrt(2 * len(joint.likelihood.inputs))
         return std

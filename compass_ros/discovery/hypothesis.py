@@ -8,12 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, Linear, Point, cost, inward, minimise
+from compass_ros.calibration.least_squares import Fit, Point, cost, extended, minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import freed, growing, settled
+from compass_ros.calibration.residuals import variances
 from compass_ros.discovery.discrepancy import Free, free, spread, with_law
 from compass_ros.discovery.evidence import solve
 from compass_ros.discovery.first_order import WIDTH, Ranked
+from compass_ros.discovery.joint import widened
 from compass_ros.discovery.response import Response, respond
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
@@ -21,10 +23,9 @@ from compass_ros.types import Floats, Ints
 
 _SHARES = (0.15, 0.4, 0.7, 1.0)
 """Parts of the first-order step from which a fit begins, the best of them."""
-_STEP = 0.02
-"""Finite differences of a new law's numbers, in standard deviations of their priors."""
 EPISODES = 9
-"""Episodes, or windows, to which the models of a race are fitted until it is over."""
+"""Episodes, or windows, to which the models of a race are fitted until it is over: a budget; of twelve recordings all
+that are not held out."""
 _SLIGHT = 0.3
 """Gain [log likelihood] of a step that is the last one: models are compared by whole units."""
 
@@ -61,10 +62,7 @@ class Hypothesis:
         What acts on contacts or commands counts as a push that moves the recordings as much as it does.
         """
         response, squared = self.response, np.zeros(len(self.response.unit))
-        at = len(self.simulator.cell.parameters)
-        for attached in self.laws:
-            own = slice(at, at + len(attached.effect.quantities))
-            at = own.stop
+        for attached, own in self.own():
             if attached.effect.forces is not None and attached.effect.moves:
                 pushed = response.accelerations(attached, self.fit.point.values[own])
                 squared += np.mean(pushed**2, axis=(0, 1))
@@ -106,33 +104,34 @@ class Hypothesis:
         """With a discrepancy in proportion to its laws; without laws, with none."""
         return self._with_law[0] if self.laws else self.free.alone
 
+    @cached_property
+    def std(self) -> Floats:
+        """(P + Q,) standard deviations of parameters and laws; the prior's where the recordings say nothing.
+
+        A law has the library's formula, which need not be nature's: what the episodes disagree on counts too.
+        """
+        std, free = self.likelihood.prior_std.copy(), self.fit.free
+        std[free] *= np.sqrt(variances(self.likelihood, self.fit))
+        return std
+
+    def own(self) -> Iterator[tuple[Attached, slice]]:
+        """Each of its laws with the place of its numbers among all values."""
+        at = len(self.simulator.cell.parameters)
+        for attached in self.laws:
+            size = len(attached.effect.quantities)
+            yield attached, slice(at, at + size)
+            at += size
+
     @property
     def rho(self) -> float:
         """Posterior mean of the discrepancy's size, as a share of the laws' own."""
         return self._with_law[1] if self.laws else 0.0
 
 
-def widened(parent: Hypothesis, laws: Sequence[Attached]) -> tuple[Simulator, Likelihood]:
-    """Its simulator and likelihood with more laws; priors wide beside a modest law, bounded by what is physical."""
-    simulator = parent.simulator.with_effects([*parent.simulator.effects, *laws])
-    quantities = [q for a in laws for q in a.effect.quantities]
-    mean = [0.0 if q.amplitude else q.start for q in quantities]
-    std = [WIDTH * q.scale if q.amplitude else (q.high - q.low) / 4 for q in quantities]
-    likelihood = parent.likelihood
-    return simulator, replace(
-        likelihood,
-        predict=simulator.observe,
-        predict_alike=simulator.observe_alike,
-        parameters=simulator.parameters,
-        prior_mean=np.concatenate([likelihood.prior_mean, mean]),
-        prior_std=np.concatenate([likelihood.prior_std, std]),
-    )
-
-
 def from_parent(parent: Hypothesis, ranked: Ranked, iterations: int) -> Hypothesis:
     """Fitted from the first-order solution about its parent's fit."""
     attached = ranked.candidate.attached
-    simulator, likelihood = widened(parent, [attached])
+    simulator, likelihood = widened(parent.simulator, parent.likelihood, [attached])
     amplitude = attached.amplitudes
     found = solve_beside(parent, ranked)
     tuned, base = parent.fit.free, parent.fit.point
@@ -146,7 +145,7 @@ def from_parent(parent: Hypothesis, ranked: Ranked, iterations: int) -> Hypothes
     costs, residuals = cost(likelihood, starts, parent.fit.robust)
     best = int(np.argmin(costs))
     everything = np.concatenate([tuned, len(base.values) + np.arange(len(amplitude))])
-    linear = _extended(parent.fit.linear, likelihood, starts[best], residuals[best], everything)
+    linear = extended(parent.fit.linear, likelihood, starts[best], residuals[best], everything)
     fit = minimise(likelihood, starts[best], everything, iterations, parent.fit.robust, 1.0, linear, fresh=False)
     return Hypothesis((*parent.laws, attached), simulator, likelihood, fit, parent.response)
 
@@ -155,11 +154,9 @@ def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:
     """(p,) first-order change of the parent's parameters beside a law at its first-order numbers."""
     tangent = parent.response.tangent
     sizes = np.array([WIDTH * q.scale for q in ranked.candidate.attached.effect.quantities if q.amplitude])
-    amounts = ranked.numbers[ranked.candidate.attached.amplitudes] / sizes
-    if ranked.columns.shape[2] != len(amounts):
-        amounts = np.ones(1)
-    moved = replace(tangent, residual=tangent.residual + ranked.columns @ amounts)
-    return solve(moved, moved.normal, None).parameters
+    moved = ranked.columns @ (ranked.numbers[ranked.candidate.attached.amplitudes] / sizes)
+    beside = replace(tangent, residual=tangent.residual + moved)
+    return solve(beside, beside.normal, None).parameters
 
 
 def race(parent: Hypothesis, starts: Sequence[tuple[Attached, Floats]]) -> list[Hypothesis]:
@@ -187,7 +184,7 @@ def _runner(
     parent: Hypothesis, attached: Attached, numbers: Floats, rows: Ints
 ) -> Iterator[tuple[Likelihood, Fit]]:
     """Fits of one model to some episodes, longer from one to the next; shapes stay as they are."""
-    simulator, likelihood = widened(parent, [attached])
+    simulator, likelihood = widened(parent.simulator, parent.likelihood, [attached])
     values = np.concatenate([parent.likelihood.prior_mean, numbers])
     first, own = len(simulator.cell.parameters), len(parent.fit.point.values)
     values[first:own] = parent.fit.point.values[first:]
@@ -197,7 +194,7 @@ def _runner(
 
 def _whole(parent: Hypothesis, attached: Attached, values: Floats) -> Hypothesis:
     """A model fitted to all episodes from (P + q,) values."""
-    simulator, likelihood = widened(parent, [attached])
+    simulator, likelihood = widened(parent.simulator, parent.likelihood, [attached])
     of_laws = np.arange(len(simulator.cell.parameters), len(values))
     point = Point(values, np.zeros_like(likelihood.inputs), np.inf)
     fit = freed(likelihood, point, 5, parent.fit.robust, of_laws)[1]
@@ -215,19 +212,3 @@ def further(hypothesis: Hypothesis, iterations: int) -> Hypothesis:
     fit = hypothesis.fit
     fit = minimise(hypothesis.likelihood, fit.point, fit.free, iterations, fit.robust, _SLIGHT, fit.linear)
     return replace(hypothesis, fit=fit, near=None)
-
-
-def _extended(old: Linear, likelihood: Likelihood, point: Point, residual: Floats, free: Ints) -> Linear:
-    """The parent's differences with those of the new numbers at the start."""
-    new = free[old.jacobian.shape[-1] :]
-    episodes = len(likelihood.inputs)
-    steps = inward(likelihood, point, new, np.full(len(new), _STEP))
-    values = np.tile(point.values, (len(new), 1))
-    values[np.arange(len(new)), new] += steps
-    index = np.tile(np.arange(episodes), len(new))
-    inputs = np.tile(likelihood.inputs + point.launch, (len(new), 1))
-    there = likelihood.residual(np.repeat(values, episodes, axis=0), inputs, index)
-    change = there.reshape(len(new), *residual.shape) - residual
-    scaled = np.moveaxis(change * (likelihood.prior_std[new] / steps)[:, None, None, None], 0, -1)
-    onset = np.concatenate([old.onset, np.zeros((episodes, len(new)))], axis=1)
-    return Linear(residual, np.concatenate([old.jacobian, scaled], axis=-1), old.launch_jacobian, onset)

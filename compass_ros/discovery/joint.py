@@ -10,12 +10,10 @@ from itertools import islice
 import numpy as np
 
 from compass_ros.calibration.least_squares import (
-    FIRST_STEP,
     Fit,
-    Linear,
     Point,
     cost,
-    inward,
+    extended,
     minimise,
     normal_equations,
 )
@@ -148,7 +146,7 @@ def fit_jointly(space: Space, scores: Sequence[Score], iterations: int, anew: bo
     if best == 0:  # nothing but the smallest step helps: begin with it, amplitudes must not be exactly zero
         start = replace(starts[1], cost=np.inf)
     everything = np.concatenate([free, len(base.values) + np.arange(len(numbers))])
-    linear = _extended(space, likelihood, start, residuals[max(best, 1)], everything)
+    linear = extended(space.fit.linear, likelihood, start, residuals[max(best, 1)], everything)
     fit = minimise(likelihood, start, everything, iterations, space.fit.robust, 1.0, linear, fresh=False, anew=anew)
     return Joint(simulator, likelihood, fit, added)
 
@@ -262,20 +260,3 @@ def _parameter_step(space: Space, scores: Sequence[Score]) -> Floats:
     prior = (space.fit.point.values - space.likelihood.prior_mean)[space.fit.free]
     gradient[: len(prior)] += prior / space.likelihood.prior_std[space.fit.free]
     return np.asarray(-space.inverse @ gradient)
-
-
-def _extended(space: Space, likelihood: Likelihood, point: Point, residual: Floats, free: Ints) -> Linear:
-    """The base's differences with those of the new quantities at the start."""
-    old = space.fit.linear
-    new = free[old.jacobian.shape[-1] :]
-    episodes = len(likelihood.inputs)
-    steps = inward(likelihood, point, new, np.full(len(new), FIRST_STEP))
-    values = np.tile(point.values, (len(new), 1))
-    values[np.arange(len(new)), new] += steps
-    index = np.tile(np.arange(episodes), len(new))
-    inputs = np.tile(likelihood.inputs + point.launch, (len(new), 1))
-    there = likelihood.residual(np.repeat(values, episodes, axis=0), inputs, index)
-    change = there.reshape(len(new), *residual.shape) - residual
-    scaled = np.moveaxis(change * (likelihood.prior_std[new] / steps)[:, None, None, None], 0, -1)
-    onset = np.concatenate([old.onset, np.zeros((episodes, len(new)))], axis=1)
-    return Linear(residual, np.concatenate([old.jacobian, scaled], axis=-1), old.launch_jacobian, onset)

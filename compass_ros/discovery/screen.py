@@ -9,23 +9,23 @@ paths, so that shapes (a centre, a radius, a frequency) are searched without a r
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
-from scipy.optimize import minimize
 
 from compass_ros.calibration.least_squares import Fit, robust_weight
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.impulses import Impulses
+from compass_ros.discovery.shapes import best_shapes
 from compass_ros.simulation import Simulator
-from compass_ros.simulation.effects import Quantity
 from compass_ros.types import Floats
 
 STARTS = 5
 """Places from which the shapes of a force are searched."""
-ELSEWHERE, APART = 0.5, 0.1
-"""Share of the best gain from which another shape is worth a sketch; how far off that is, as a share of a range."""
+EVALUATIONS = 60
+"""Of each of these searches, for each shape."""
+ELSEWHERE = 0.5
+"""Share of the best gain from which another shape is worth a sketch."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,9 @@ def solve(matrix: Floats, pull: Floats, low: Floats, high: Floats, prior: Floats
 
 def score_force(space: Space, candidate: Candidate) -> Score:
     """Best shape and amplitudes of a force: a grid over the shapes, then a simplex from its best points."""
-    best, *others = (_scored(space, candidate, shapes) for shapes in _best_shapes(space, candidate))
+    quantities = candidate.attached.effect.quantities
+    shapes = best_shapes(quantities, lambda one: _at(space, candidate, one)[1], STARTS, EVALUATIONS)
+    best, *others = (_scored(space, candidate, one) for one in shapes)
     return replace(best, elsewhere=tuple(other for other in others if other.gain > ELSEWHERE * best.gain))
 
 
@@ -165,43 +167,6 @@ def _scored(space: Space, candidate: Candidate, shapes: Floats) -> Score:
     if not candidate.attached.effect.superposes:
         sizes = np.array([np.max(np.abs(numbers - shapes))])
     return Score(candidate, numbers, gain, columns @ sizes)
-
-
-def _best_shapes(space: Space, candidate: Candidate) -> list[Floats]:
-    """(q,) shapes that gain most, each in its neighbourhood, the best first; zeros for amplitudes.
-
-    The simplex starts from STARTS points of which no two are neighbours in the grid: they lead to different places.
-    """
-    quantities = candidate.attached.effect.quantities
-    shape_of = [i for i, q in enumerate(quantities) if not q.amplitude]
-    if not shape_of:
-        return [np.zeros(len(quantities))]
-
-    def at(point: Floats) -> Floats:
-        shapes = np.zeros(len(quantities))
-        shapes[shape_of] = point
-        return shapes
-
-    def fall(point: Floats) -> float:
-        return -_at(space, candidate, at(point))[1]
-
-    grids = [shape_grid(quantities[i]) for i in shape_of]
-    nodes = np.array(list(product(*(range(len(grid)) for grid in grids))))
-    points = np.array(list(product(*grids)))
-    falls = np.array([fall(point) for point in points])
-    starts: list[int] = []
-    for i in np.argsort(falls, kind="stable"):
-        if len(starts) < STARTS and all(np.abs(nodes[i] - nodes[k]).max() > 1 for k in starts):
-            starts.append(int(i))
-    bounds = [(quantities[i].low, quantities[i].high) for i in shape_of]
-    options = {"maxfev": 60 * len(shape_of), "xatol": 1e-4, "fatol": 1e-2}
-    found = [minimize(fall, points[i], method="Nelder-Mead", bounds=bounds, options=options) for i in starts]
-    apart = APART * np.ptp(bounds, axis=1)
-    best: list[Floats] = []
-    for one in sorted(found, key=lambda one: float(one.fun)):
-        if all(np.any(np.abs(one.x - other) > apart) for other in best):
-            best.append(one.x)
-    return [at(point) for point in best]
 
 
 def _at(space: Space, candidate: Candidate, shapes: Floats) -> tuple[Floats, float]:
@@ -227,13 +192,3 @@ def _at(space: Space, candidate: Candidate, shapes: Floats) -> tuple[Floats, flo
         if gain > best[1]:
             best = (shapes + ray / float(np.max(np.abs(ray))) * size[0], gain)
     return best
-
-
-def shape_grid(shape: Quantity) -> Floats:
-    """Where the search for a shape begins: places evenly, sizes and rates in equal ratios, a tail at one."""
-    low, high = shape.low, shape.high
-    if shape.name == "tail":
-        return np.array([shape.start])
-    if low < 0 < high:
-        return np.linspace(0.85 * low, 0.85 * high, 9 if high - low > 0.6 else 5)
-    return np.geomspace(max(low, 0.02 * high), 0.8 * high, 12 if shape.name == "frequency" else 4)

@@ -22,9 +22,10 @@ from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
 
 RACED = 6
-"""Neighbours that are fitted; the better half of them again with exact differences."""
+"""Neighbours that are fitted; the better half of them again with exact differences. A budget."""
 STEPS = 4
-"""Gauss-Newton steps of the first fit."""
+"""Gauss-Newton steps of each fit: a budget. The evidence is taken at the maximum of the linear model, steps left over
+included."""
 
 
 @dataclass(frozen=True)

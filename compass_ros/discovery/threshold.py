@@ -13,14 +13,15 @@ import numpy as np
 
 from compass_ros.calibration.least_squares import robust_weight
 from compass_ros.calibration.noise import Noise, correlated
-from compass_ros.discovery.discrepancy import spread
+from compass_ros.discovery.discrepancy import free_sizes, spread
 from compass_ros.discovery.evidence import Factored
 from compass_ros.discovery.first_order import Ranked
 from compass_ros.discovery.response import Response
-from compass_ros.discovery.settings import FREE, PRIOR_UNKNOWN
+from compass_ros.discovery.settings import PRIOR_UNKNOWN
 from compass_ros.types import Floats
 
 DRAWS = 200
+"""Simulated recordings: two of them lie beyond the odds that noise exceeds with probability 0.01."""
 
 
 def largest_odds(
@@ -36,18 +37,16 @@ def largest_odds(
     draws = np.stack([simulated(response, noise, rng).reshape(rows) for _ in range(DRAWS)], axis=2)
     weighted = draws * (weight / tangent.correlation_time)[:, :, None]
     squares = np.einsum("edm,edm->m", weighted, draws)
-    still = np.zeros_like(tangent.away), np.zeros_like(tangent.own_away)
 
     def products(columns: Floats) -> Floats:
         return np.asarray(columns.transpose(0, 2, 1) @ weighted)
 
-    centred = replace(tangent, away=still[0], own_away=still[1])
+    centred = replace(tangent, away=np.zeros_like(tangent.away), own_away=np.zeros_like(tangent.own_away))
     last = np.concatenate([products(c) for c in (tangent.parameters, tangent.own, tangent.pushes)], axis=1)
     plain = Factored(centred, tangent.normal, None).logs(last, squares)
-    kinds = [response.unit * response.forces, response.unit * (1 - response.forces)]
-    sizes = [spread(response, s * kind) for kind in kinds for s in FREE]
-    by_size = np.stack([Factored(centred, tangent.normal, s).logs(last, squares) for s in sizes])
-    best = np.logaddexp.reduce(by_size - np.log(len(sizes)), axis=0) - plain + PRIOR_UNKNOWN
+    spreads = [spread(response, size) for size in free_sizes(response)]
+    by_size = np.stack([Factored(centred, tangent.normal, s).logs(last, squares) for s in spreads])
+    best = np.logaddexp.reduce(by_size - np.log(len(spreads)), axis=0) - plain + PRIOR_UNKNOWN
     p = tangent.parameters.shape[2]
     for one, prior in zip(ranked, priors, strict=True):
         wider = centred.more(one.columns, np.zeros(one.columns.shape[2]))

@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from compass_ros.discovery.screen import shape_grid
+from compass_ros.discovery.shapes import shape_grid
 from compass_ros.rivals.accelerations import Samples
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, Effect

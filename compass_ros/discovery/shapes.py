@@ -1,0 +1,64 @@
+"""The search for a law's shapes (a centre, a radius, a frequency) where a gain is cheap to ask."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import product
+
+import numpy as np
+from scipy.optimize import minimize
+
+from compass_ros.simulation.effects import Quantity
+from compass_ros.types import Floats
+
+APART = 0.1
+"""How far off another shape is, as a share of a range."""
+
+
+def best_shapes(
+    quantities: Sequence[Quantity], gain: Callable[[Floats], float], starts: int, evaluations: int
+) -> list[Floats]:
+    """(q,) shapes that gain most, each in its neighbourhood, the best first; zeros for amplitudes.
+
+    A grid, then simplexes from `starts` points of which no two are neighbours in the grid: they lead to different
+    places. `evaluations`: of each simplex, for each shape.
+    """
+    shape_of = [i for i, q in enumerate(quantities) if not q.amplitude]
+    if not shape_of:
+        return [np.zeros(len(quantities))]
+
+    def at(point: Floats) -> Floats:
+        shapes = np.zeros(len(quantities))
+        shapes[shape_of] = point
+        return shapes
+
+    def fall(point: Floats) -> float:
+        return -gain(at(point))
+
+    grids = [shape_grid(quantities[i]) for i in shape_of]
+    nodes = np.array(list(product(*(range(len(grid)) for grid in grids))))
+    points = np.array(list(product(*grids)))
+    falls = np.array([fall(point) for point in points])
+    begun: list[int] = []
+    for i in np.argsort(falls, kind="stable"):
+        if len(begun) < starts and all(np.abs(nodes[i] - nodes[k]).max() > 1 for k in begun):
+            begun.append(int(i))
+    bounds = [(quantities[i].low, quantities[i].high) for i in shape_of]
+    options = {"maxfev": evaluations * len(shape_of), "xatol": 1e-4, "fatol": 1e-2}
+    found = [minimize(fall, points[i], method="Nelder-Mead", bounds=bounds, options=options) for i in begun]
+    apart = APART * np.ptp(bounds, axis=1)
+    best: list[Floats] = []
+    for one in sorted(found, key=lambda one: float(one.fun)):
+        if all(np.any(np.abs(one.x - other) > apart) for other in best):
+            best.append(one.x)
+    return [at(point) for point in best]
+
+
+def shape_grid(shape: Quantity) -> Floats:
+    """Where the search for a shape begins: places evenly, sizes and rates in equal ratios, a tail at one."""
+    low, high = shape.low, shape.high
+    if shape.name == "tail":
+        return np.array([shape.start])
+    if low < 0 < high:
+        return np.linspace(0.85 * low, 0.85 * high, 9 if high - low > 0.6 else 5)
+    return np.geomspace(max(low, 0.02 * high), 0.8 * high, 12 if shape.name == "frequency" else 4)
