@@ -9,6 +9,7 @@ from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached, Effect
 from compass_ros.simulation.sites import DRIVES, JOINTS, PLANAR, Site, SiteKind, names_of
 from compass_ros.simulation.sizes import JointSize, alike
+from compass_ros.simulation.visited import Visited
 from compass_ros.types import Floats
 
 ALIKE: tuple[tuple[SiteKind, ...], ...] = (PLANAR, *((kind,) for kind in JOINTS))
@@ -43,7 +44,8 @@ def candidates(simulator: Simulator, values: Floats, inputs: Floats, time_s: Flo
     On all movers of a kind together and on each alone, on each wall, on the drives of a kind and on each alone. (P,)
     values, (E, A) inputs and (E, F) times [s] say how joints move and what drives are told.
     """
-    joints = simulator.joint_sizes(values, inputs, time_s)
+    visited = Visited(simulator, values, inputs, time_s)
+    joints = visited.joint_sizes()
     out: list[Attached] = []
     for effect in EFFECTS.values():
         if effect.name in BY_NAME_ALONE:
@@ -53,7 +55,7 @@ def candidates(simulator: Simulator, values: Floats, inputs: Floats, time_s: Flo
         elif effect.on_walls:
             out.extend(Attached(effect, (wall,)) for wall in simulator.places.walls)
         elif any(kind in DRIVES for kind in effect.on):
-            out.extend(_on_drives(effect, simulator, (values, inputs, time_s)))
+            out.extend(_on_drives(effect, simulator, visited))
         elif simulator.accepts(effect, ()):
             out.append(Attached(effect, ()))
     return tuple(Candidate(attached) for attached in out if not attached.effect.scattered)
@@ -62,8 +64,8 @@ def candidates(simulator: Simulator, values: Floats, inputs: Floats, time_s: Flo
 def scattered(simulator: Simulator, values: Floats, inputs: Floats, time_s: Floats) -> tuple[Candidate, ...]:
     """Effects that differ from episode to episode by chance: on all drives of a kind."""
     of_chance = [effect for effect in EFFECTS.values() if effect.scattered]
-    told = (values, inputs, time_s)
-    return tuple(Candidate(a) for effect in of_chance for a in _on_drives(effect, simulator, told))
+    visited = Visited(simulator, values, inputs, time_s)
+    return tuple(Candidate(a) for effect in of_chance for a in _on_drives(effect, simulator, visited))
 
 
 def _on_movers(effect: Effect, simulator: Simulator, joints: Mapping[str, JointSize]) -> Iterator[Attached]:
@@ -81,7 +83,7 @@ def _on_movers(effect: Effect, simulator: Simulator, joints: Mapping[str, JointS
             yield Attached(effect.on_kinds(own) if mistaken else effect, names)
 
 
-def _on_drives(effect: Effect, simulator: Simulator, told: tuple[Floats, Floats, Floats]) -> Iterator[Attached]:
+def _on_drives(effect: Effect, simulator: Simulator, visited: Visited) -> Iterator[Attached]:
     """All drives of a kind together, and each alone; without names all of the cell where they are of one kind."""
     able = [drive for drive in simulator.places.drives if drive.kind in effect.on]
     for kind in dict.fromkeys(drive.kind for drive in able):
@@ -89,7 +91,7 @@ def _on_drives(effect: Effect, simulator: Simulator, told: tuple[Floats, Floats,
             objects = () if drives == able else names_of(drives)
             if effect.on_drive is None or kind == "tool_drive":
                 sized: Effect = effect
-            elif (size := simulator.drive_size(drives, *told)).command > 0:
+            elif (size := visited.drive_size(drives)).command > 0:
                 sized = effect.at(size)
             else:
                 continue  # what was never told anything cannot show it

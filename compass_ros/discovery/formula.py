@@ -30,6 +30,7 @@ from compass_ros.simulation.effects.effect import Context
 from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.simulation.sites import JOINTS, PLANAR, names_of
 from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize, alike
+from compass_ros.simulation.visited import Visited
 from compass_ros.types import Floats, Ints
 
 NAME = "formula"
@@ -258,7 +259,7 @@ def propose(space: Space, held_out: Likelihood, iterations: int = 12) -> Proposa
 
 def _movers(space: Space) -> list[tuple[tuple[str, ...], Variables]]:
     """The movers of a kind together, and each alone, with what a formula on them is written in."""
-    sizes = space.simulator.joint_sizes(*space.told)
+    sizes = Visited(space.simulator, *space.told).joint_sizes()
     moving = space.simulator.moving.values()
     of_kinds = [[site for site in moving if site.kind in kinds] for kinds in ALIKE]
     sets = [names_of(chosen) for own in of_kinds for chosen in together_and_alone(own)]

@@ -19,6 +19,7 @@ from compass_ros.simulation.effects import Attached, Effect, Quantity
 from compass_ros.simulation.effects.effect import Context
 from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.simulation.sites import JOINTS, PLANAR
+from compass_ros.simulation.visited import Visited
 from compass_ros.types import Bools, Floats
 
 MOMENTS = 25
@@ -120,7 +121,7 @@ def _size(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> dict[str, _
     bodies = [name for name, site in simulator.moving.items() if site.kind not in JOINTS]
     masses = simulator.masses(values, bodies)
     out = {name: _Size(float(m), 1.0, 1.0, SPEED_CHANGE) for name, m in zip(bodies, masses, strict=True)}
-    for name, s in simulator.joint_sizes(values, inputs, likelihood.time_s).items():
+    for name, s in Visited(simulator, values, inputs, likelihood.time_s).joint_sizes().items():
         push = OF_PUSH * s.speed**2 / s.spread
         out[name] = _Size(s.inertia, OF_LENGTH * s.spread, push, OF_SPEED * s.speed)
     return out

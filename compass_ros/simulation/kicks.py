@@ -34,7 +34,7 @@ def kicks(simulator: Simulator, values: Floats, inputs: Floats, time_s: Floats, 
     """For (P,) values, (E, A) inputs and (E, F) times [s], at so many moments, evenly over the recordings."""
     episodes = len(inputs)
     tiled = np.tile(values, (episodes, 1))
-    start, controls, steps = simulator.begun(tiled, inputs, time_s)
+    start, controls, steps = simulator.begun(tiled, inputs, simulator.physics.duration(tiled, inputs, time_s))
     states, sensors = simulator.play(tiled, start, controls, steps)
     states = np.concatenate([start[:, None], states], axis=1)
     moments = np.unique(np.round(np.linspace(0, steps, count + 1)).astype(int))

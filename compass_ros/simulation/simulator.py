@@ -18,12 +18,10 @@ from compass_ros.cells.signals import Signal
 from compass_ros.simulation.alike import roll_alike
 from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.effect import Effect
-from compass_ros.simulation.extents import BodySize, Path, body_size, paths, standing
 from compass_ros.simulation.native.program import evaluate, path_columns
 from compass_ros.simulation.physics import Physics, interpolate, places_of
 from compass_ros.simulation.player import Player
-from compass_ros.simulation.sites import JOINTS, Places, Site
-from compass_ros.simulation.sizes import DriveSize, JointSize, command_unit, joint_sizes, largest_forces
+from compass_ros.simulation.sites import Places, Site
 from compass_ros.types import Floats, Ints, Parameter, Unit
 
 CHUNK = 128
@@ -208,51 +206,8 @@ class Simulator:
 
     def masses(self, values: Floats, names: Sequence[str]) -> Floats:
         """(N,) mass of each body in the plane at (P,) values [kg]."""
-        model = self._player.written(self.physics, values[None])[0]
+        model = self.written(values)
         return np.array([model.body_mass[model.body(name).id] for name in names])
-
-    def joint_sizes(self, values: Floats, inputs: Floats, time_s: Floats) -> dict[str, JointSize]:
-        """How each tracked joint moves, and what moves it, in (E, A) inputs up to (E, F) times [s], at (P,) values."""
-        joints = {name: site for name, site in self.moving.items() if site.kind in JOINTS}
-        if not joints:
-            return {}
-        model, states, controls = self._visited(values, inputs, time_s)
-        noise = self.cell.spec.noise_m
-        noises = {name: s.noise or noise for s in self.cell.signals if s.jointed and s.places for name in s.at}
-        return joint_sizes(model, joints, states, (controls, self.physics.drives.parts), noises)
-
-    def paths_in_space(
-        self, names: Sequence[str], values: Floats, inputs: Floats, time_s: Floats
-    ) -> tuple[dict[str, BodySize], dict[str, Path]]:
-        """How bodies move in (E, A) inputs up to (E, F) times [s], at (P,) values; what stands as what never moves."""
-        model, states, _ = self._visited(values, inputs, time_s)
-        found, seconds = paths(model, names, states), states.shape[1] * self.time_step
-        sites = {name: self.places.body(name) for name in names}
-        noise = self.cell.spec.noise_m
-        return {
-            name: body_size(model, site, found[name], seconds, noise) if site else standing(model)
-            for name, site in sites.items()
-        }, found
-
-    def drive_forces(self, values: Floats, inputs: Floats, time_s: Floats) -> Floats:
-        """(nu,) the largest force of each actuator in (E, A) inputs up to (E, F) times [s], at (P,) values."""
-        model, states, controls = self._visited(values, inputs, time_s)
-        return largest_forces(model, states, (controls, self.physics.drives.parts))
-
-    def drive_size(
-        self, drives: Sequence[Site], values: Floats, inputs: Floats, time_s: Floats, forces: Floats | None = None
-    ) -> DriveSize:
-        """What drives of one kind are told in (E, A) inputs up to (E, F) times [s], at (P,) values.
-
-        `forces`: (nu,) what the actuators exert there (`drive_forces`); without them that is taken for one.
-        """
-        tiled = np.tile(values, (len(inputs), 1))
-        plain = replace(self.physics, effects=())
-        steps = self._steps(plain.duration(tiled, inputs, time_s))
-        controls, unit = plain.controls(tiled, inputs, steps), command_unit(self.physics.model, drives[0])
-        told = [np.linalg.norm(controls[:, :, list(d.actuators)], axis=2).max() for d in drives if controls is not None]
-        force = 1.0 if forces is None else float(max(forces[i] for d in drives for i in d.actuators)) or 1.0
-        return DriveSize(drives[0].kind, float(max(told)), unit, force, steps * self.time_step)
 
     def forces(self, attached: Attached, numbers: Floats, values: Floats, states: Floats) -> dict[str, Floats]:
         """(B, F, 2) force of an effect on each mover in given states.
@@ -280,9 +235,9 @@ class Simulator:
         """The scene at (P,) values; it holds until the next rollout and is not to be changed."""
         return self._player.written(self.physics, values[None])[0]
 
-    def begun(self, values: Floats, inputs: Floats, time_s: Floats) -> tuple[Floats, Floats | None, int]:
-        """(B, s) states at the start, (B, T, n) what drives MuJoCo, and T, for what is asked at (B, F) times [s]."""
-        steps = self._steps(self.physics.duration(values, inputs, time_s))
+    def begun(self, values: Floats, inputs: Floats, duration: float) -> tuple[Floats, Floats | None, int]:
+        """(B, s) states at the start, (B, T, n) what drives MuJoCo for `duration` seconds, and T."""
+        steps = self._steps(duration)
         return self.physics.start(values, inputs), self.physics.controls(values, inputs, steps), steps
 
     def motion(self, values: Floats, inputs: Floats, duration: float) -> Motion:
@@ -325,9 +280,8 @@ class Simulator:
 
     def states(self, values: Floats, inputs: Floats, duration: float) -> tuple[Floats, Floats]:
         """(B, T + 1, s) whole states (mjSTATE_FULLPHYSICS), the start first, and (B, T, n) what drives MuJoCo."""
-        steps = self._steps(duration)
-        start, controls = self.physics.start(values, inputs), self.physics.controls(values, inputs, steps)
-        states = self._player.play(self.physics, values, start, controls, steps)[0]
+        start, controls, steps = self.begun(values, inputs, duration)
+        states = self.play(values, start, controls, steps)[0]
         driven = np.empty((len(values), steps, 0)) if controls is None else controls
         return np.concatenate([start[:, None], states], axis=1), driven
 
@@ -352,20 +306,11 @@ class Simulator:
         rows = np.where(np.array(columns) >= 0, rows, 0.0).reshape(*rows.shape[:2], len(names), 4)
         return np.asarray(rows + np.array(rest))
 
-    def _visited(self, values: Floats, inputs: Floats, time_s: Floats) -> tuple[mujoco.MjModel, Floats, Floats | None]:
-        """The model at (P,) values, the (E, T, s) states of episodes and the (E, T, n) controls in them."""
-        tiled = np.tile(values, (len(inputs), 1))
-        steps = self._steps(self.physics.duration(tiled, inputs, time_s))
-        start, controls = self.physics.start(tiled, inputs), self.physics.controls(tiled, inputs, steps)
-        states = self._player.play(self.physics, tiled, start, controls, steps)[0]
-        return self._player.written(self.physics, values[None])[0], states, controls
-
     def _observe_together(
         self, values: Floats, inputs: Floats, time_s: Floats, like: Ints, until: Floats
     ) -> tuple[Floats, Floats]:
         """As `observe_alike`. Where start or commands differ, rows differ from there on, whatever was said."""
-        steps = self._steps(self.physics.duration(values, inputs, time_s))
-        start, controls = self.physics.start(values, inputs), self.physics.controls(values, inputs, steps)
+        start, controls, steps = self.begun(values, inputs, self.physics.duration(values, inputs, time_s))
         known = np.minimum(until / self.time_step, steps).astype(int)
         if controls is not None:
             other = (controls != controls[like]).reshape(len(controls), -1)
@@ -374,7 +319,7 @@ class Simulator:
 
         def play(rows: Ints, begin: Floats, step: int) -> Floats:
             of_rows = None if controls is None else controls[rows, step:]
-            return self._player.play(self.physics, values[rows], begin, of_rows, steps - step)[0]
+            return self.play(values[rows], begin, of_rows, steps - step)[0]
 
         columns = 1 + self.physics.dynamics.columns()
         states, same = roll_alike(play, start, steps, columns, like, known, CHUNK)
@@ -392,9 +337,8 @@ class Simulator:
 
     def _roll(self, values: Floats, inputs: Floats, duration: float, columns: Ints) -> Floats:
         """(B, T + 1, n) the given places of (qpos, qvel, act, sensordata), the start first."""
-        steps = self._steps(duration)
-        start, controls = self.physics.start(values, inputs), self.physics.controls(values, inputs, steps)
-        states, sensors = self._player.play(self.physics, values, start, controls, steps)
+        start, controls, steps = self.begun(values, inputs, duration)
+        states, sensors = self.play(values, start, controls, steps)
         if self.physics.model.nsensordata:
             rows = np.concatenate([start[:, None], states[:, :-1]], axis=1)
             return np.asarray(np.concatenate([rows, sensors], axis=2)[:, :, 1 + columns])

@@ -24,6 +24,7 @@ from compass_ros.discovery.screen import Score, Space
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.simulation.sizes import unit_joint
+from compass_ros.simulation.visited import Visited
 from compass_ros.types import Floats
 from test.discovery.planted import CALM, HELD_OUT, PUCKS, planned_space, recorded, space_of
 from test.simulation import robots
@@ -145,7 +146,7 @@ def test_so_is_one_on_a_joint(
     cell = robots.robot(tmp_path, (kind,))
     robot = Simulator(cell, threads=1)
     space = robots.space_of(robot, robots.recorded(robot, [], [], robots.shots(cell, 3)))
-    of = of_joint(robot.joint_sizes(*space.told)["j0"])
+    of = of_joint(Visited(robot, *space.told).joint_sizes()["j0"])
     given = [Monomial(component, (place, 0, 0, 0, speed), of) for component, place, speed in terms]
     numbers = [share * of.largest / term.size for share, term in zip(shares, given, strict=True)]
     assert spelled(space, written(given, numbers, ("j0",))) == laws

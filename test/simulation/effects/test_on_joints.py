@@ -13,6 +13,7 @@ from compass_ros.discovery.tangents import score
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, Exported, FittedEffect, attach, effect, read_effects, write_effects
 from compass_ros.simulation.sizes import JointSize, unit_joint
+from compass_ros.simulation.visited import Visited
 from compass_ros.types import Floats
 from test.simulation.robots import recorded, robot, shots, space_of
 
@@ -59,11 +60,11 @@ def test_sizes_of_a_joint_are_in_its_own_units(tmp_path: Path, force: float, len
     plain, other = robot(tmp_path, joints), None
     before = Simulator(plain, threads=1)
     inputs = shots(plain, 3)
-    expected = before.joint_sizes(*told(before, inputs))
+    expected = Visited(before, *told(before, inputs)).joint_sizes()
     other = robot(tmp_path, joints, (), force, length)
     simulator = Simulator(other, threads=1)
     units = [length if a.name[0] != "u" and joints[int(a.name[1:])] == "slide" else 1.0 for a in other.action]
-    found = simulator.joint_sizes(*told(simulator, inputs * units))
+    found = Visited(simulator, *told(simulator, inputs * units)).joint_sizes()
     for name, kind in zip(("j0", "j1", "j2"), joints, strict=True):
         of_force, of_length = (force * length, 1.0) if kind == "hinge" else (force, length)
         one, two = expected[name], found[name]
@@ -87,7 +88,7 @@ def test_the_inertia_is_the_joints_own(
 ) -> None:
     cell = robot(tmp_path, joints, drives)
     simulator = Simulator(cell, threads=1)
-    assert simulator.joint_sizes(*told(simulator, shots(cell, 2)))["j0"].inertia == pytest.approx(expected)
+    assert Visited(simulator, *told(simulator, shots(cell, 2))).joint_sizes()["j0"].inertia == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("gravity", [True, False])
@@ -96,7 +97,7 @@ def test_the_force_of_a_joint_that_is_held_is_what_holds_it(tmp_path: Path, driv
     """A still arm's own motion says nothing of its forces; a joint that never moves has sizes too, and finite ones."""
     cell = robot(tmp_path, ("hinge",), (drive,) if drive else (), gravity=gravity)
     simulator = Simulator(cell, threads=1)
-    size = simulator.joint_sizes(*told(simulator, np.zeros((2, len(cell.input_names)))))["j0"]
+    size = Visited(simulator, *told(simulator, np.zeros((2, len(cell.input_names))))).joint_sizes()["j0"]
     assert all(np.isfinite(x) and x > 0 for x in (size.inertia, size.speed, size.fastest, size.spread, size.force))
     weight = 0.4 * 9.81 * 0.02 if gravity else 0.0
     assert size.force >= 0.4 * weight

@@ -10,6 +10,7 @@ from compass_ros.cells import Cell
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, effect
 from compass_ros.simulation.extents import pair_size, signal_size
+from compass_ros.simulation.visited import Visited
 from compass_ros.types import Floats
 from test.cells.written import content, parameter, written
 
@@ -94,19 +95,18 @@ def yard(folder: Path, force: float = 1.0, length: float = 1.0) -> Cell:
 def sized(simulator: Simulator, name: str) -> Attached:
     """A law on its site, as large as it can be there by what the plain simulator shows."""
     objects, law = NEW[name], effect(name)
-    told = (simulator.defaults, INPUTS, TIME)
+    visited = Visited(simulator, simulator.defaults, INPUTS, TIME)
     site = Attached(law, objects).sites(simulator.places)[0]
     if site.kind in ("hinge", "slide"):
-        return Attached(law.at(simulator.joint_sizes(*told)[objects[0]]), objects)
+        return Attached(law.at(visited.joint_sizes()[objects[0]]), objects)
     if site.kind in ("body", "geom_pair", "body_pair"):
-        sizes, paths = simulator.paths_in_space([{"floor": "world"}.get(n, n) for n in objects], *told)
+        sizes, paths = visited.paths_in_space([{"floor": "world"}.get(n, n) for n in objects])
         if site.kind == "body":
             return Attached(law.at(sizes[objects[0]]), objects)
         one, other = ((sizes[name], paths[name]) for name in sizes)
         return Attached(law.at(pair_size(site.kind, one, other)), objects)
     if law.on_drive is not None:
-        forces = simulator.drive_forces(*told)
-        return Attached(law.at(simulator.drive_size([site], *told, forces)), objects)
+        return Attached(law.at(visited.drive_size([site], visited.drive_forces())), objects)
     if law.on_signal is not None:
         return Attached(law.at(signal_size(site, plain(simulator))), objects)
     return Attached(law, objects)

@@ -1,0 +1,76 @@
+"""How a scene moves in recorded episodes, and what moves it there: from which the sizes of laws follow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from compass_ros.simulation.extents import BodySize, Path, body_size, paths, standing
+from compass_ros.simulation.simulator import Simulator
+from compass_ros.simulation.sites import JOINTS, Site
+from compass_ros.simulation.sizes import DriveSize, JointSize, command_unit, joint_sizes, largest_forces
+from compass_ros.types import Floats
+
+
+class Visited:
+    """(E, A) inputs up to (E, F) times [s], at (P,) values. They are played when that is first asked for, and once."""
+
+    def __init__(self, simulator: Simulator, values: Floats, inputs: Floats, time_s: Floats) -> None:
+        self._simulator, self._values = simulator, values
+        self._asked = np.tile(values, (len(inputs), 1)), inputs, time_s
+
+    def joint_sizes(self) -> dict[str, JointSize]:
+        """Of each tracked joint."""
+        simulator = self._simulator
+        joints = {name: site for name, site in simulator.moving.items() if site.kind in JOINTS}
+        if not joints:
+            return {}
+        noise, signals = simulator.cell.spec.noise_m, simulator.cell.signals
+        noises = {name: s.noise or noise for s in signals if s.jointed and s.places for name in s.at}
+        states, driven = self._states
+        return joint_sizes(simulator.written(self._values), joints, states, driven, noises)
+
+    def paths_in_space(self, names: Sequence[str]) -> tuple[dict[str, BodySize], dict[str, Path]]:
+        """Of bodies; what stands as what never moves."""
+        simulator, states = self._simulator, self._states[0]
+        model = simulator.written(self._values)
+        found, seconds = paths(model, names, states), states.shape[1] * simulator.time_step
+        sites = {name: simulator.places.body(name) for name in names}
+        noise = simulator.cell.spec.noise_m
+        return {
+            name: body_size(model, site, found[name], seconds, noise) if site else standing(model)
+            for name, site in sites.items()
+        }, found
+
+    def drive_forces(self) -> Floats:
+        """(nu,) the largest force of each actuator."""
+        return largest_forces(self._simulator.written(self._values), *self._states)
+
+    def drive_size(self, drives: Sequence[Site], forces: Floats | None = None) -> DriveSize:
+        """What drives of one kind are told.
+
+        `forces`: (nu,) what the actuators exert there (`drive_forces`); without them that is taken for one.
+        """
+        controls, steps = self._commands
+        unit = command_unit(self._simulator.physics.model, drives[0])
+        told = [np.linalg.norm(controls[:, :, list(d.actuators)], axis=2).max() for d in drives if controls is not None]
+        force = 1.0 if forces is None else float(max(forces[i] for d in drives for i in d.actuators)) or 1.0
+        return DriveSize(drives[0].kind, float(max(told)), unit, force, steps * self._simulator.time_step)
+
+    @cached_property
+    def _states(self) -> tuple[Floats, tuple[Floats | None, int]]:
+        """(E, T, s) states, and (E, T, n) what drove MuJoCo with the bits that say what its rows are."""
+        simulator, (values, inputs, _) = self._simulator, self._asked
+        start, controls, steps = simulator.begun(values, inputs, simulator.physics.duration(*self._asked))
+        states = simulator.play(values, start, controls, steps)[0]
+        return states, (controls, simulator.physics.drives.parts)
+
+    @cached_property
+    def _commands(self) -> tuple[Floats | None, int]:
+        """(E, T, n) what drives are told before any law changes it, and T."""
+        plain = self._simulator.with_effects(())
+        values, inputs, _ = self._asked
+        _, controls, steps = plain.begun(values, inputs, plain.physics.duration(*self._asked))
+        return controls, steps
