@@ -43,7 +43,8 @@ class Hypothesis:
 
     @property
     def name(self) -> str:
-        return " + ".join(sorted(f"{a.effect.name}({', '.join(a.objects)})" for a in self.laws)) or "none"
+        said = (f"{a.effect.name}({', '.join(a.objects)})" if a.objects else a.effect.name for a in self.laws)
+        return " + ".join(sorted(said)) or "none"
 
     @property
     def chi_square(self) -> float:
@@ -156,7 +157,9 @@ def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:
     sizes = np.array([WIDTH * q.scale for q in ranked.candidate.attached.effect.quantities if q.amplitude])
     moved = ranked.columns @ (ranked.numbers[ranked.candidate.attached.amplitudes] / sizes)
     beside = replace(tangent, residual=tangent.residual + moved)
-    return solve(beside, beside.normal, None).parameters
+    change = np.zeros(len(parent.fit.free))
+    change[parent.response.inside] = solve(beside, beside.normal, None).parameters
+    return change
 
 
 def race(parent: Hypothesis, starts: Sequence[tuple[Attached, Floats]]) -> list[Hypothesis]:

@@ -42,6 +42,14 @@ class Response:
     """(E, D, K, S) change of the residual [sigma] per unit around a moment."""
 
     @cached_property
+    def inside(self) -> Ints:
+        """Which of the free parameters lie within their bounds: one that lies on a bound is held there, and a law whose
+        size is zero there adds nothing to the evidence."""
+        values, free = self.fit.point.values, self.fit.free
+        within = (values > self.likelihood.low) & (values < self.likelihood.high)
+        return np.flatnonzero(within[free])
+
+    @cached_property
     def tangent(self) -> Tangent:
         likelihood, fit = self.likelihood, self.fit
         episodes, random = len(likelihood.inputs), likelihood.launch_std > 0
@@ -49,10 +57,10 @@ class Response:
         rows = (episodes, linear.residual[0].size)
         return Tangent(
             residual=linear.residual.reshape(rows),
-            parameters=linear.jacobian.reshape(*rows, -1),
+            parameters=linear.jacobian.reshape(*rows, -1)[:, :, self.inside],
             own=linear.launch_jacobian.reshape(*rows, -1),
             pushes=self.pushes.reshape(*rows, -1),
-            away=((likelihood.prior_mean - point.values) / likelihood.prior_std)[fit.free],
+            away=((likelihood.prior_mean - point.values) / likelihood.prior_std)[fit.free[self.inside]],
             own_away=-point.launch[:, random] / likelihood.launch_std[random],
             robust=fit.robust,
             correlation_time=likelihood.correlation_time,

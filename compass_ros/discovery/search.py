@@ -17,12 +17,15 @@ from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.hypothesis import Hypothesis, finished, from_parent, further, race
+from compass_ros.discovery.joint import Joint
 from compass_ros.discovery.settings import PRIOR_LAW, PRIOR_UNKNOWN, RHO, RHO_PRIOR
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
 
 RACED = 6
 """Neighbours that are fitted; the better half of them again with exact differences. A budget."""
+SLIGHT = 0.01
+"""Probability that is left to models that are not brought to their optimum: that of a false alarm."""
 STEPS = 4
 """Gauss-Newton steps of each fit: a budget. The evidence is taken at the maximum of the linear model, steps left over
 included."""
@@ -114,12 +117,33 @@ def search(
         ranked = rank(FirstOrder(best.response), candidates)
         if top + max(r.gain + prior.of_laws([r.candidate.name]) for r in ranked) < found.unknown:
             break  # no law more could come up to a free discrepancy
-    if not known:
-        return found
+    finish(known, lambda h: h.log_evidence - none + prior.of_laws(a.effect.name for a in h.laws))
     ordered = sorted(known.values(), key=lambda one: -one[1])
-    last = finished(ordered[0][0])
-    ordered[0] = (last, last.log_evidence - none + prior.of_laws(a.effect.name for a in last.laws))
     return Found(plain, found.unknown, tuple(h for h, _ in ordered), tuple(o for _, o in ordered), tuple(first))
+
+
+def finish(known: dict[str, tuple[Hypothesis, float]], odds_of: Callable[[Hypothesis], float]) -> None:
+    """Bring the models that hold all but SLIGHT of the probability to their optimum, in place.
+
+    What a fit still lacks there, and rough differences, are worth some units of log evidence: as much as two laws may
+    be apart. One with a law that is within its error bars of zero, as the noise leaves them or as the episodes disagree
+    on it (`Joint.distinct`), is the model without that law, and goes.
+    """
+    done: set[str] = set()
+    while True:
+        ordered = sorted(known.items(), key=lambda item: -item[1][1])
+        logs = np.array([odds for _, (_, odds) in ordered])
+        before = np.concatenate([[-np.inf], np.logaddexp.accumulate(logs)[:-1]]) - log_sum(logs) if len(logs) else logs
+        open_ = [name for (name, _), held in zip(ordered, before, strict=True) if np.exp(held) < 1 - SLIGHT]
+        name = next((one for one in open_ if one not in done), None)
+        if name is None:
+            return
+        done.add(name)
+        model = finished(known[name][0])
+        if Joint(model.simulator, model.likelihood, model.fit, model.laws).distinct:
+            known[name] = model, odds_of(model)
+        else:
+            del known[name]
 
 
 def calls_for_more(model: Hypothesis, price: float) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -134,7 +135,8 @@ class Judge:
         mismatch = Mismatch(
             verdict, where, findings, self.undetectable, following, sentence, self._explanations(), self.alpha
         )
-        tried, warnings, cell = self._tried(best), self.warnings, len(self.simulator.cell.parameters)
+        tried = self._tried(best, findings[0].evidence.held_out_gain if findings else math.nan)
+        warnings, cell = self.warnings, len(self.simulator.cell.parameters)
         if best is None:
             return Discovery(mismatch, tried=tried, warnings=warnings)
         values, std = best.fit.point.values, best.std
@@ -155,10 +157,19 @@ class Judge:
         ]
         return tuple(sorted(rows, key=lambda e: -e.probability))[:SAID]
 
-    def _tried(self, best: Hypothesis | None) -> tuple[Tried, ...]:
-        rows = zip(self.found.models, self.found.odds, self.found.probabilities[2], strict=True)
+    def _tried(self, best: Hypothesis | None, gain: float) -> tuple[Tried, ...]:
+        """The most probable models. Held-out episodes are opened for the one that is said, and for no other."""
+        rows = list(zip(self.found.models, self.found.odds, self.found.probabilities[2], strict=True))[:SAID]
         return tuple(
-            Tried(m.name, m.laws[0].effect.channel, odds, 0.0, m is best, f"probability {p:.3g}") for m, odds, p in rows
+            Tried(
+                m.name,
+                m.laws[0].effect.channel,
+                odds,
+                gain if m is best else math.nan,
+                m is best,
+                f"probability {p:.3g}",
+            )
+            for m, odds, p in rows
         )
 
     def _evidence(self, model: Hypothesis, after: float) -> Evidence:

@@ -37,7 +37,7 @@ def print_diagnosis(result: Result, extras: ReportExtras, console: Console | Non
     verdict = result.mismatch.verdict
     out.print(Text.assemble((f"{VERDICT_TITLE[verdict]}. ", STYLE[VERDICT_LEVEL[verdict]]), result.mismatch.sentence))
     out.print(Text(VERDICT_MEANING[verdict], "dim"))
-    for heading, text in where_rows(result.mismatch.where) if result.mismatch.where else ():
+    for heading, text in where_rows(result.mismatch.where, result.unit) if result.mismatch.where else ():
         out.print(Text(f"  {heading:8} {text}"))
     out.print(gap_table(result))
     out.print(parameter_table(result, extras.truth))
@@ -76,8 +76,9 @@ def _effect(finding: EffectFinding) -> Table:
 
 
 def _candidates(result: Result, extras: ReportExtras) -> Table:
-    name, others = Column("candidate", no_wrap=True), ("channel", "log evidence", "held-out gain", "")
-    table = Table(name, *others, title="Tried", title_justify="left")
+    name, others = Column("candidate", overflow="fold"), ("channel", "log evidence", "held-out gain", "")
+    columns = [Column(other, no_wrap=True) for other in others[:-1]]
+    table = Table(name, *columns, others[-1], title="Tried", title_justify="left")
     for row in ranking(result, extras.candidates):
         style = "bold" if row["kept"] else "dim"
         table.add_row(*(Text(str(row[key]), style) for key in ("name", "channel", "evidence", "gain", "note")))

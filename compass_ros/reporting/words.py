@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from compass_ros.reporting.numbers import MINUS, with_unit
-from compass_ros.types import ParameterRow, Phase, Result, Told, Verdict, Where
+from compass_ros.types import ParameterRow, Phase, Result, Told, Unit, Verdict, Where
 
 Level = Literal["good", "note", "care", "bad"]
 Model = Literal["nominal", "calibrated", "with_effects"]
@@ -58,6 +58,9 @@ PHASE: Mapping[Phase, str] = {
     "all": "in every phase",
 }
 
+OF_JOINTS: Mapping[Phase, str] = {**PHASE, "strike": "in the drive", "free": "in motion"}
+"""The same where hinges are tracked and nothing else."""
+
 CHANNEL: Mapping[str, str] = {
     "dynamics": "dynamics: a force while moving",
     "contact": "contact: what happens when things touch",
@@ -104,9 +107,12 @@ def gap_line(result: Result) -> str:
     return f"held-out error {' → '.join(steps)}; noise floor {with_unit(result.noise_floor_m, result.unit)}"
 
 
-def where_rows(where: Where) -> tuple[tuple[str, str], ...]:
-    """What, in words, for each field of `where` that says something."""
-    rows = [("object", "all objects" if where.object == "all" else where.object), ("phase", PHASE[where.phase])]
+def where_rows(where: Where, unit: Unit) -> tuple[tuple[str, str], ...]:
+    """What, in words, for each field of `where` that says something; `unit`: of the result."""
+    hinges = unit == "rad"
+    every = "all joints" if hinges else "all objects"
+    rows = [("object", every if where.object == "all" else where.object)]
+    rows.append(("phase", (OF_JOINTS if hinges else PHASE)[where.phase]))
     rows.append(("channel", CHANNEL[where.channel]))
     if where.region is not None:
         x, y = where.region.centre_m

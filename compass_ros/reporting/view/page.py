@@ -88,7 +88,7 @@ def view(result: Result, extras: ReportExtras) -> dict[str, Any]:
         "others": [parameter(row, extras.truth.get(row.name)) for row in others],
         "with_truth": bool(extras.truth),
         "meaning": VERDICT_MEANING[mismatch.verdict],
-        "where": where_rows(mismatch.where) if mismatch.where is not None else (),
+        "where": where_rows(mismatch.where, result.unit) if mismatch.where is not None else (),
         "effects": [effect(e) for e in mismatch.effects],
         "ranking": ranking(result, extras.candidates),
         "command": extras.command,
