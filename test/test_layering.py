@@ -22,6 +22,7 @@ JOINS = {
     "operation": 3,
     "planning": 4,
     "concealed": 3,
+    "worlds": 2,
     "assembly": 4,
     "pipeline": 5,
     "evaluation": 6,
@@ -51,6 +52,7 @@ LAYERS = {
 HOMES = {
     ("mujoco", "robosuite"): {"simulation", "cells", "concealed"},
     ("torch",): {"calibration", "policy"},
+    ("numba",): {"worlds"},
     ("pysindy", "sklearn"): {"rivals"},
     ("stable_baselines3", "gymnasium"): {"policy"},
     ("cv2",): {"tracking"},

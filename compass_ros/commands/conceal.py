@@ -1,4 +1,4 @@
-"""`compass conceal`: a table with wrong parameters and perhaps with missing physics, as bags with a sealed answer."""
+"""`compass conceal`: a cell with wrong parameters and perhaps with missing physics, as bags with a sealed answer."""
 
 from __future__ import annotations
 
@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from compass_ros.cells import Cell
     from compass_ros.concealed.world import Wishes
+    from compass_ros.types import Episode
+    from compass_ros.worlds.world import Asked
 
 ANSWERS = Path("~/.local/share/compass_ros/answers")
 
@@ -22,37 +27,78 @@ def conceal(
     out: Annotated[Path, typer.Option(help="folder of the bags and of the seal")],
     cell: Annotated[str, typer.Option(help="name of a cell, or path of its YAML")] = "air_hockey",
     answers: Annotated[Path, typer.Option(help="folder of the answers, never under --out")] = ANSWERS,
-    noise: Annotated[str, typer.Option(help="white, tracker (correlated, jittered, with outliers) or none")] = "white",
+    noise: Annotated[
+        str, typer.Option(help="air hockey: white, tracker (correlated, jittered, with outliers) or none")
+    ] = "white",
     rms: Annotated[
-        float | None, typer.Option(min=1e-6, help="what is left of an effect after the best parameters [m]")
+        float | None, typer.Option(min=1e-6, help="air hockey: what is left of an effect after the best parameters [m]")
     ] = None,
     forms: Annotated[
-        Literal["other", "like"], typer.Option(help="other: formulas unlike the library's; like: as there")
+        Literal["other", "like"], typer.Option(help="air hockey: other: formulas unlike the library's; like: as there")
     ] = "other",
     kind: Annotated[
         Literal["none", "one", "two", "outside"] | None, typer.Option(help="how much is missing; else drawn")
     ] = None,
     effect: Annotated[list[str] | None, typer.Option(help="the missing physics by name, once or twice")] = None,
 ) -> None:
-    """Play twelve shots on a concealed table; write the bags, and seal what is wrong with it."""
+    """Make recordings of a concealed cell; write the bags, and seal what is wrong with it."""
+    from compass_ros.cells import load
     from compass_ros.concealed.world import Wishes
+    from compass_ros.errors import ConfigError
+    from compass_ros.worlds.scenes import MODULES
+    from compass_ros.worlds.world import Asked
 
-    wishes = Wishes(seed, noise, rms, forms, kind, tuple(effect or ()))
-    path = write(cell, wishes, out, answers)
-    typer.echo(f"{out}: twelve shots and the seal; the answer is in {path.parent}")
+    names = tuple(effect or ())
+    if load(cell).name in MODULES:
+        if (noise, rms, forms) != ("white", None, "other"):
+            raise ConfigError(f"{cell}: --noise, --rms and --forms are of the cell air_hockey alone")
+        path = write_world(cell, Asked(seed, kind, names), out, answers)
+    else:
+        path = write(cell, Wishes(seed, noise, rms, forms, kind, names), out, answers)
+    typer.echo(f"{out}: recordings and the seal; the answer is in {path.parent}")
 
 
 def write(cell_name: str, wishes: Wishes, out: Path, answers: Path) -> Path:
-    """Conceal into an empty folder; return the path of the answer. Raises ConfigError where the folder is taken."""
+    """Conceal a table into an empty folder; return the path of the answer. Raises ConfigError where it is taken."""
     from compass_ros.cells import load
-    from compass_ros.concealed.seal import apart, seal
     from compass_ros.concealed.world import conceal as make
-    from compass_ros.episodes import write_episode
+
+    cell = load(cell_name)
+    _check(out, answers)
+    world = make(cell, wishes)
+    return _seal(cell, world.episodes, world.answer, out, answers)
+
+
+def write_world(cell_name: str, asked: Asked, out: Path, answers: Path) -> Path:
+    """The same for a cell with a scene in `worlds`. Raises ConfigError where it has none."""
+    from compass_ros.cells import load
+    from compass_ros.errors import ConfigError
+    from compass_ros.worlds.scenes import MODULES, scene_of
+    from compass_ros.worlds.world import Task
+
+    cell = load(cell_name)
+    scene = scene_of(cell.name)
+    if scene is None:
+        raise ConfigError(f"{cell_name}: has no concealed worlds; known: air_hockey, {', '.join(MODULES)}")
+    _check(out, answers)
+    world = scene(Task(cell.name, cell.hash, cell.model_path, cell.parameters), asked)
+    return _seal(cell, world.episodes, world.answer, out, answers)
+
+
+def _check(out: Path, answers: Path) -> None:
+    from compass_ros.concealed.seal import apart
     from compass_ros.errors import ConfigError
 
     apart(answers, out)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise ConfigError(f"--out {out}: is not empty; a world needs a folder of its own")
-    world = make(load(cell_name), wishes)
-    bags = {episode.name: write_episode(episode, out) for episode in world.episodes}
-    return seal(world.answer, out, bags, answers)
+
+
+def _seal(cell: Cell, episodes: tuple[Episode, ...], answer: Mapping[str, object], out: Path, answers: Path) -> Path:
+    from compass_ros.concealed.seal import seal
+    from compass_ros.episodes import write_episode
+    from compass_ros.operation.current import sources
+
+    where = sources(cell) if cell.spec.inputs or cell.spec.signals else ()
+    bags = {episode.name: write_episode(episode, out, where) for episode in episodes}
+    return seal(answer, out, bags, answers)

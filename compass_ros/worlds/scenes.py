@@ -1,0 +1,23 @@
+"""Which cell has which scene. A module of a scene has `conceal(task, asked) -> World`; it is imported when needed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+
+from compass_ros.worlds.world import Scene
+
+MODULES: Mapping[str, str] = {
+    "two_joint_arm": "arms.passive",
+    "two_joint_arm_driven": "arms.driven",
+    "kinova3": "arms.kinova",
+    "kinova3_effort": "arms.kinova",
+}
+
+
+def scene_of(cell: str) -> Scene | None:
+    """The scene of a cell by its name; None where it has none."""
+    if cell not in MODULES:
+        return None
+    scene: Scene = import_module(f"compass_ros.worlds.{MODULES[cell]}").conceal
+    return scene
