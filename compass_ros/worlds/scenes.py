@@ -12,6 +12,7 @@ MODULES: Mapping[str, str] = {
     "two_joint_arm_driven": "arms.driven",
     "kinova3": "arms.kinova",
     "kinova3_effort": "arms.kinova",
+    "ball_flight": "flight.scene",
 }
 
 

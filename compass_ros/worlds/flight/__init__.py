@@ -1,0 +1,1 @@
+"""A ball in free flight: what air and cameras do to it, after published wind tunnels and textbooks."""
