@@ -65,6 +65,11 @@ def shown(faults: tuple[Optics, ...], time_s: Floats) -> Floats:
     return time_s
 
 
+def taken(faults: tuple[Optics, ...], shown_s: Floats) -> Floats:
+    """(F,) when frames were taken whose stamps show (F,) moments [s], to first order in what the clock is off."""
+    return 2 * shown_s - shown(faults, shown_s)
+
+
 def scaled(ratio: float, origin: Floats) -> Points:
     """A calibration wand that is longer than it says: all lengths from the (3,) origin by `ratio`."""
     return lambda points: np.asarray(origin + ratio * (points - origin))

@@ -13,6 +13,7 @@ MODULES: Mapping[str, str] = {
     "kinova3": "arms.kinova",
     "kinova3_effort": "arms.kinova",
     "ball_flight": "flight.scene",
+    "bouncing_ball": "bounce.scene",
 }
 
 

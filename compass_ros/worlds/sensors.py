@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from typing import TypeVar
+
 import numpy as np
 from numpy.random import Generator
 
 from compass_ros.types import Bools, Floats, Ints
 
+L = TypeVar("L")
 START_NS = 1_000_000_000
 """Stamp of the first moment of a recording."""
 
@@ -49,3 +53,18 @@ def stamps(time_s: Floats, drift_ppm: float = 0.0, jitter_s: float = 0.0, rng: G
 def strength(with_laws: Floats, without: Floats, noise: Floats | float) -> float:
     """rms of a change of (..., C) signals, over one standard deviation of the noise of each, (C,) or one for all."""
     return float(np.sqrt(np.mean(((with_laws - without) / noise) ** 2)))
+
+
+def strengths(
+    laws: Mapping[str, L], see: Callable[[Mapping[str, L]], Floats], noise: Floats | float
+) -> tuple[dict[str, float], float]:
+    """`strength` of each law where the others stay, and of all together.
+
+    Args:
+        laws: Of the world, by name.
+        see: (N, C) what the sensors would show without noise, in the same frames for any laws.
+        noise: As `strength` takes it.
+    """
+    full = see(laws)
+    alone = {left: strength(full, see({n: law for n, law in laws.items() if n != left}), noise) for left in laws}
+    return alone, strength(full, see({}), noise) if laws else 0.0

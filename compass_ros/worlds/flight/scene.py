@@ -42,17 +42,17 @@ def conceal(task: Task, asked: Asked) -> World:
     found = {name: DRAW[name](rng["laws"]) for name in names}
     fastest = float(draw.log_uniform(rng["throws"], SLOWEST_MS, FASTEST_MS))
     throws = [thrown(rng["throws"], fastest) for _ in range(THROWS)]
-    full = [played(ball, throw, found) for throw in throws]
-    kept = [{n: law for n, law in found.items() if n != left} for left in found]
-    partial = [[played(ball, throw, laws) for throw in throws] for laws in kept]
-    bare = [played(ball, throw, {}) for throw in throws]
-    laws = [
-        missing(name, found[name], strength(full, found, without, rest))
-        for name, without, rest in zip(found, partial, kept, strict=True)
-    ]
-    episodes = recorded(task, full, found, rng["noise"])
+    flights = [played(ball, throw, found) for throw in throws]
+    time_s = [frames(flight) for flight in flights]
+
+    def see(laws: Mapping[str, Drawn]) -> Floats:
+        flown = [played(ball, throw, laws) for throw in throws]
+        return np.concatenate([places(flight, laws, t) for flight, t in zip(flown, time_s, strict=True)])
+
+    alone, total = sensors.strengths(found, see, PLACE_M)
+    laws = [missing(name, law, alone[name]) for name, law in found.items()]
+    episodes = recorded(task, flights, found, rng["noise"])
     noise = {"place_m": PLACE_M, "angle_rad": ANGLE_RAD, "lost": LOST, "rate_hz": RATE_HZ}
-    total = strength(full, found, bare, {})
     said = answer(task, "flight", asked, kind, laws, values, total, noise)
     return World(task.name, tuple(episodes), said)
 
@@ -107,17 +107,10 @@ def frames(flight: Flight) -> Floats:
     return time_s[: low[0]] if len(low) else time_s
 
 
-def strength(
-    full: Sequence[Flight], laws: Mapping[str, Drawn], less: Sequence[Flight], rest: Mapping[str, Drawn]
-) -> float:
-    """rms of what is seen of the places with and without, over the noise; a clock counts by the way it makes."""
-    changes = []
-    for one, other in zip(full, less, strict=True):
-        time_s = frames(one)
-        true = np.clip(2 * time_s - optics.shown(faults(laws), time_s), 0.0, DURATION_S)
-        as_seen = optics.through(faults(laws), one.pose, true)[:, :3]
-        changes.append(as_seen - optics.through(faults(rest), other.pose, time_s)[:, :3])
-    return sensors.strength(np.concatenate(changes), np.zeros(3), PLACE_M)
+def places(flight: Flight, laws: Mapping[str, Drawn], shown_s: Floats) -> Floats:
+    """(F, 3) what is seen in frames whose stamps show (F,) moments."""
+    true_s = np.clip(optics.taken(faults(laws), shown_s), 0.0, DURATION_S)
+    return optics.through(faults(laws), flight.pose, true_s)[:, :3]
 
 
 def recorded(task: Task, flights: Sequence[Flight], laws: Mapping[str, Drawn], rng: Generator) -> list[Episode]:
