@@ -73,6 +73,7 @@ setup(
         "matplotlib",
         "mcap",
         "mujoco>=3.9,<3.10",
+        "numba",  # the concealed arms: equations of motion, compiled
         "numpy",
         "opencv-python",
         "openpyxl",

@@ -13,6 +13,7 @@ from compass_ros.types import Floats, Parameter
 from compass_ros.worlds.world import Asked, Kind
 
 ODDS: Mapping[Kind, float] = {"none": 0.22, "one": 0.50, "two": 0.12, "outside": 0.16}
+_COUNT: Mapping[Kind, int] = {"none": 0, "one": 1, "two": 2, "outside": 1}
 T = TypeVar("T")
 
 
@@ -22,16 +23,22 @@ def streams(seed: int, scene: str, purposes: Sequence[str]) -> dict[str, Generat
     return {name: np.random.default_rng([seed, i, *own]) for i, name in enumerate(purposes)}
 
 
-def laws(asked: Asked, known: Sequence[str], outside: Sequence[str], rng: Generator) -> tuple[Kind, tuple[str, ...]]:
+def laws(
+    asked: Asked, known: Sequence[str], outside: Sequence[str], rng: Generator, family: Mapping[str, str] | None = None
+) -> tuple[Kind, tuple[str, ...]]:
     """How much is missing, and what: names of `known` laws, or of one from `outside` the suite's vocabulary.
 
-    Raises ConfigError where more than two, or unknown ones, are asked for.
+    Two laws of one world are of two families, where these are given by the names of the laws. Raises ConfigError where
+    more than two laws, or unknown ones, are asked for.
     """
     drawn: Kind = list(ODDS)[int(rng.choice(len(ODDS), p=list(ODDS.values())))]
     if not asked.names:
         kind = asked.kind or drawn
-        pool, count = (outside, 1) if kind == "outside" else (known, {"none": 0, "one": 1, "two": 2}[kind])
-        return kind, tuple(str(name) for name in rng.choice(list(pool), count, replace=False))
+        pool = list(outside if kind == "outside" else known)
+        while True:
+            found = tuple(str(name) for name in rng.choice(pool, _COUNT[kind], replace=False))
+            if len({(family or {}).get(name, name) for name in found}) == len(found):
+                return kind, found
     every = [*known, *outside]
     for name in asked.names:
         if name not in every:
