@@ -39,7 +39,9 @@ class Use:
 
     arm: Arm
     torque: Floats
-    """(J,) that its gears carry, about [N m]."""
+    """(J,) of gravity on it, about [N m]."""
+    carried: Floats
+    """(J,) that its gears carry, about [N m]: of an arm without drives, what rotors need and rub."""
     peak: Floats
     """(J,) largest torque of its drives [N m]."""
     speed: Floats
@@ -76,7 +78,7 @@ def _at(use: Use, rng: Generator) -> tuple[tuple[int, ...], list[int], int]:
 
 def lugre(use: Use, rng: Generator) -> Law:
     at, own, n = _at(use, rng)
-    coulomb = use.arm.dry[own] * rng.uniform(0.8, 1.2, n)
+    coulomb = use.arm.dry[own]
     bristle = log_uniform(rng, 3e-4, 2e-3, n)
     micro = np.sqrt(coulomb / bristle * use.arm.armature[own]) * rng.uniform(0.3, 1, n)
     static = coulomb * (1 + use.sizes(rng, 0.1, 1, n))
@@ -111,7 +113,7 @@ def place(use: Use, rng: Generator) -> Law:
 
 def warming(use: Use, rng: Generator) -> Law:
     at, _, n = _at(use, rng)
-    return WarmingUp(at, log_uniform(rng, 0.3, 2, n), float(log_uniform(rng, 300, 1500)))
+    return WarmingUp(at, use.sizes(rng, 0.3, 2, n), float(log_uniform(rng, 300, 1500)))
 
 
 def cogging(use: Use, rng: Generator) -> Law:
@@ -145,25 +147,25 @@ def eddy(use: Use, rng: Generator) -> Law:
 def flexible(use: Use, rng: Generator) -> Law:
     at, own, n = _at(use, rng)
     twist = use.noise * log_uniform(rng, 2, 25, n)
-    stiffness = use.torque[own] / twist
+    stiffness = use.carried[own] / twist
     damping = 2 * rng.uniform(0.03, 0.1, n) * np.sqrt(stiffness * use.inertia(own))
     bristle = twist * rng.uniform(0.2, 0.6, n)
     second = np.column_stack([rng.uniform(1.3, 1.6, n), rng.uniform(1.6, 1.8, n)])
-    ends = np.outer(use.torque[own], [0.4, 1.2])
+    ends = np.outer(use.carried[own], [0.4, 1.2])
     return FlexibleGear(at, stiffness, second, ends, damping, stiffness * bristle * rng.uniform(0.1, 0.4, n), bristle)
 
 
 def play(use: Use, rng: Generator) -> Law:
     at, own, n = _at(use, rng)
     gap = use.noise * log_uniform(rng, 3, 30, n)
-    stiffness = 5 * use.torque[own] / gap
+    stiffness = 5 * use.carried[own] / gap
     return Play(at, gap, stiffness, 2 * rng.uniform(0.05, 0.2, n) * np.sqrt(stiffness * use.inertia(own)))
 
 
 def transmission(use: Use, rng: Generator) -> Law:
     at, own, n = _at(use, rng)
     first = use.noise * log_uniform(rng, 1.5, 10, n)
-    stiffness = 4 * use.torque[own] / use.noise
+    stiffness = 4 * use.carried[own] / use.noise
     damping = 2 * rng.uniform(0.05, 0.2, n) * np.sqrt(stiffness * use.inertia(own))
     size = np.column_stack([first, first * rng.uniform(0.1, 0.4, n)])
     waves = 2.0 * rng.choice([30, 50, 80, 100], n)

@@ -26,7 +26,7 @@ SETUP = Setup(
     motion=_motion,
     sensors=Sensors(noise=0.0002, step=2 * np.pi / 2**14),
     tool=(0.0, 0.0, -0.3),
-    load=(0.01, 0.12),
+    load=(0.004, 0.1),
     torque=(4.0, 1.0),
     share=0.3,
 )

@@ -64,7 +64,7 @@ class Setup:
     load: tuple[float, float]
     """Lightest and heaviest payload [kg]."""
     torque: tuple[float, ...] | None = None
-    """(J,) that the gears of an arm without drives carry, about [N m]."""
+    """(J,) of gravity on an arm without drives, about [N m]."""
     share: float = 1.0
     """See `Use.share`."""
 
@@ -119,11 +119,22 @@ def _played(arm: Arm, drive: Drive, laws: Sequence[Law]) -> Played:
 
 def _use(setup: Setup, arm: Arm, plain: Played) -> Use:
     rate = np.gradient(plain.angle, 1 / RATE_HZ, axis=1)
-    speed, fastest = np.sqrt(np.mean(rate**2, axis=(0, 1))), np.abs(rate).max(axis=(0, 1))
-    torque = np.sqrt(np.mean(plain.effort**2, axis=(0, 1))) if setup.torque is None else np.array(setup.torque)
+    faster = np.gradient(rate, 1 / RATE_HZ, axis=1)
+    if setup.torque is None:
+        torque = carried = _rms(plain.effort)
+    else:
+        torque, carried = np.array(setup.torque), arm.dry + arm.armature * _rms(faster)
     noise = sensors.total_noise(setup.sensors.noise, setup.sensors.step)
-    peak = np.abs(plain.effort).max(axis=(0, 1))
-    return Use(arm, torque, peak, speed, fastest, noise, np.array(setup.tool), setup.load, setup.share)
+    return Use(
+        arm=arm, torque=torque, carried=carried, peak=np.abs(plain.effort).max(axis=(0, 1)), speed=_rms(rate),
+        fastest=np.abs(rate).max(axis=(0, 1)), noise=noise, tool=np.array(setup.tool), load=setup.load,
+        share=setup.share,
+    )  # fmt: skip
+
+
+def _rms(series: Floats) -> Floats:
+    """(J,) of (E, F, J)."""
+    return np.asarray(np.sqrt(np.mean(series**2, axis=(0, 1))))
 
 
 def _strength(s: Sensors, one: Played, other: Played) -> float:

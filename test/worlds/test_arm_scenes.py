@@ -1,0 +1,151 @@
+"""Concealed arms as worlds: same seed, same bits; laws by name; the cell at the true values plays the same motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compass_ros.calibration.noise import measure_noise
+from compass_ros.cells import load
+from compass_ros.commands.conceal import write_world
+from compass_ros.concealed.seal import unseal
+from compass_ros.errors import ConfigError
+from compass_ros.operation.current import read
+from compass_ros.posing import launched
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.replay import recordings
+from compass_ros.simulation.windows import windows
+from compass_ros.types import Floats
+from compass_ros.worlds import draw
+from compass_ros.worlds.arms import draws
+from compass_ros.worlds.arms.arm import Arm
+from compass_ros.worlds.arms.kinova import SETUP as KINOVA
+from compass_ros.worlds.arms.passive import SETUP as PASSIVE
+from compass_ros.worlds.arms.scene import Motion, Setup, make
+from compass_ros.worlds.scenes import scene_of
+from compass_ros.worlds.world import Asked, World
+from test.worlds.arms import ARMS, task
+
+
+def world(name: str, asked: Asked) -> World:
+    scene = scene_of(name)
+    assert scene is not None
+    return scene(task(name), asked)
+
+
+def series(made: World) -> list[Floats]:
+    return [track.value for e in made.episodes for track in (*e.tracks, *e.inputs)]
+
+
+def laws() -> list[tuple[Setup, str, str]]:
+    found = [(PASSIVE, "two_joint_arm", name) for names in PASSIVE.known for name in names]
+    found += [(PASSIVE, "two_joint_arm", name) for name in PASSIVE.outside]
+    passive = {name for _, _, name in found}
+    every = {**{n: 0 for names in KINOVA.known for n in names}, **dict.fromkeys(KINOVA.outside)}
+    return found + [(KINOVA, "kinova3", name) for name in every if name not in passive]
+
+
+def brief(setup: Setup) -> Setup:
+    """With three short recordings."""
+
+    def motion(arm: Arm, rng: np.random.Generator) -> Motion:
+        full = setup.motion(arm, rng)
+        told = None if full.drive.told is None else full.drive.told[:3, :4200]
+        drive = replace(
+            full.drive, told=told, first=full.drive.first[:3], seconds=0.6, session_s=full.drive.session_s[:3]
+        )
+        return replace(full, drive=drive)
+
+    return replace(setup, motion=motion)
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_another_world() -> None:
+    one, again, other = (make(brief(PASSIVE), task("two_joint_arm"), Asked(seed, "one")) for seed in (7, 7, 8))
+    assert one.answer == again.answer
+    assert all(np.array_equal(a, b) for a, b in zip(series(one), series(again), strict=True))
+    assert one.answer["parameters"] != other.answer["parameters"]
+
+
+def test_parameters_do_not_depend_on_what_is_missing() -> None:
+    own = brief(PASSIVE), task("two_joint_arm")
+    plain, brake = make(*own, Asked(7, "none")), make(*own, Asked(7, names=("eddy_brake",)))
+    assert plain.answer["parameters"] == brake.answer["parameters"]
+    assert plain.answer["strength"] == 0
+    assert plain.answer["laws"] == []
+    assert brake.answer["kind"] == "outside"
+
+
+@pytest.mark.parametrize(("setup", "cell", "name"), laws(), ids=lambda value: value if isinstance(value, str) else "")
+def test_each_law_changes_what_is_seen_and_says_what_it_is(setup: Setup, cell: str, name: str) -> None:
+    made = make(brief(setup), task(cell), Asked(3, names=(name,)))
+    assert all(np.isfinite(value).all() for value in series(made))
+    laws = made.answer["laws"]
+    assert isinstance(laws, list)
+    said = laws[0]
+    assert said["name"] == name
+    assert said["class"]
+    assert said["sites"]
+    assert said["source"]
+    assert said["strength"] == pytest.approx(made.answer["strength"])
+    assert 0 < said["strength"] < 2000
+    assert (said["class"] == ["unknown"]) == (made.answer["kind"] == "outside")
+
+
+def test_two_laws_are_of_two_families() -> None:
+    family = {name: str(i) for i, names in enumerate(PASSIVE.known) for name in names}
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        kind, names = draw.laws(Asked(seed, "two"), list(family), list(PASSIVE.outside), rng, family)
+        assert kind == "two"
+        assert family[names[0]] != family[names[1]]
+
+
+def test_an_unknown_law_is_one_line() -> None:
+    with pytest.raises(ConfigError, match=r"unknown law 'lugre'; known: .*; did you mean 'lugre_friction'\?"):
+        world("two_joint_arm", Asked(0, names=("lugre",)))
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_cell_and_scene_fit_each_other(name: str) -> None:
+    assert set(draws.STRANGE) <= set((KINOVA if "kinova" in name else PASSIVE).outside)
+    assert scene_of(name) is not None
+
+
+@pytest.mark.slow
+def test_a_sealed_world_reads_back(tmp_path: Path) -> None:
+    answers = tmp_path / "answers"
+    write_world("two_joint_arm_driven", Asked(5, "none"), tmp_path / "world", answers)
+    opened = unseal(tmp_path / "world", answers)
+    assert opened.answer["cell"] == "two_joint_arm_driven"
+    made = world("two_joint_arm_driven", Asked(5, "none"))
+    for episode in made.episodes[:2]:
+        back = read(load("two_joint_arm_driven"), tmp_path / "world" / episode.name)
+        assert np.array_equal(back.tracks[0].value, episode.tracks[0].value)
+        assert np.array_equal(back.inputs[0].value, episode.inputs[0].value)
+        assert np.array_equal(back.tracks[0].stamp_ns, episode.tracks[0].stamp_ns)
+
+
+EXCESS = {"two_joint_arm": (0.0, 0.3), "two_joint_arm_driven": (0.0, 0.3), "kinova3": (0.001, 0.75)}
+"""How much later the input acts in the suite's engine [s]; what it then has beyond the noise, over the noise, at most.
+
+Measured at seed 3: 0.19, 0.20, 0.65. The arm of seven joints is simulated in steps of 2 ms by an integrator of first
+order, which is early by half a step: the delay, a parameter of that cell, takes that in a fit, and is given here.
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EXCESS)
+def test_the_cell_at_the_true_values_plays_the_same_motion(name: str) -> None:
+    cell, (later, most) = load(name), EXCESS[name]
+    made = world(name, Asked(3, "none"))
+    truth = made.answer["parameters"]
+    assert isinstance(truth, dict)
+    values = np.array([truth[p.name] + (later if p.name.endswith("delay") else 0) for p in cell.parameters])
+    data = recordings(cell, windows(cell, list(made.episodes[:4])))
+    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
+    gap = launched(Simulator(cell, threads=1).driven(data.drives), data, noise, values).gap(values, noise.rms)
+    found = gap.signals["joints"]
+    assert np.sqrt(max(found.rms**2 - found.floor**2, 0)) < most * found.floor
