@@ -14,6 +14,7 @@ MODULES: Mapping[str, str] = {
     "kinova3_effort": "arms.kinova",
     "ball_flight": "flight.scene",
     "bouncing_ball": "bounce.scene",
+    "pushed_bar": "push.scene",
 }
 
 
