@@ -30,8 +30,8 @@ def moving(slip: tuple[float, float], place: tuple[float, float] = (0.0, 0.0), p
 
 
 def test_without_laws_the_bar_moves_as_the_simulators_does_at_the_true_parameters() -> None:
-    """MuJoCo's convex friction turns from the slip where that changes quickly: 0.1 to 0.3 mm, and 1 mm in pushes near the
-    centre of mass, which run away from any difference."""
+    """MuJoCo's convex friction turns from the slip where that changes quickly: 0.1 to 0.3 mm, and 1 mm in pushes near
+    the centre of mass, which run away from any difference."""
     values = draw.true_values(TASK.parameters, np.random.default_rng(1))
     time_s = np.arange(96) / 60
     friction = bar.coulomb(values["feet@dyna@friction"])
