@@ -85,9 +85,13 @@ class Law:
         """(E, N) lowest and highest torque of dry friction."""
         return bounds
 
-    def seen(self, time_s: Floats, shown: Floats) -> Floats:
-        """(E, F, J) what the encoders show, for angles at (F,) times that go on before and after what is recorded."""
+    def seen(self, shown: Floats) -> Floats:
+        """(E, F, J) what the encoders show, for angles."""
         return shown
+
+    def clock(self, time_s: Floats) -> Floats:
+        """(F,) when the joint states were taken that are stamped with (F,) times."""
+        return time_s
 
     def missing(self, arm: Arm) -> Missing:
         """What the answer says of it."""

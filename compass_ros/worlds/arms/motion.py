@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from compass_ros.types import Floats
 from compass_ros.worlds.arms.arm import Arm
@@ -65,10 +66,13 @@ def play(arm: Arm, drive: Drive, laws: Sequence[Law] = ()) -> Played:
             frames.append((moment.q[:, arm.hinge] + arm.zero, effort(moment, told, laws)))
         moment, inner = _step(moment, inner, told, laws, step_s)
     angle, torque = (np.stack(part, axis=1) for part in zip(*frames, strict=True))
-    seen = np.arange(angle.shape[1]) / drive.rate_hz
+    stamped = taken = np.arange(angle.shape[1]) / drive.rate_hz
     for law in laws:
-        angle = law.seen(seen, angle)
-    return Played(seen, angle, torque)
+        angle, taken = law.seen(angle), law.clock(taken)
+    if not np.array_equal(stamped, taken):  # the last frames are beyond what is recorded, and may repeat
+        taken = np.minimum(taken, stamped[-1])
+        angle, torque = (CubicSpline(stamped, series, axis=1)(taken) for series in (angle, torque))
+    return Played(stamped, angle, torque)
 
 
 def effort(moment: Moment, told: Floats | None, laws: Sequence[Law]) -> Floats:
@@ -113,10 +117,11 @@ def _acceleration(moment: Moment, inner: Sequence[Floats], told: Floats | None, 
     arm = moment.arm
     torque = effort(moment, told, laws)
     force = moment.on_motors(torque) - arm.damping * moment.v
-    bounds = (np.broadcast_to(-arm.dry, force.shape), np.broadcast_to(arm.dry, force.shape))
+    dry = np.empty_like(force)
+    dry[:] = arm.dry
+    bounds = (-dry, dry)
     for law, state in zip(laws, inner, strict=True):
         force = force + law.force(moment, state, torque)
         bounds = law.bounds(moment, torque, bounds)
-    lower, upper = (np.ascontiguousarray(bound) for bound in bounds)
     own = (arm.soft, arm.back, arm.armature, *arm.chain, arm.gravity)
-    return accelerate(moment.q, moment.v, force, lower, upper, *own)
+    return accelerate(moment.q, moment.v, force, *bounds, *own)
