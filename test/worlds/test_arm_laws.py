@@ -293,4 +293,4 @@ def test_a_slow_clock_runs_away_by_its_rate() -> None:
     seen, true = play(arm(), drive, [SlowClock((), 0.005)]).angle[0, :, 0], play(arm(), drive).angle[0, :, 0]
     between = np.interp(1.005 * time[:190], time[:201], true)
     assert np.abs(seen[:190] - between).max() < 1e-3  # what lines between the frames allow
-    assert np.abs(seen[:190] - true[:190]).max() > 0.02
+    assert np.abs(seen[:190] - true[:190]).max() > 0.01
