@@ -42,7 +42,7 @@ SETUP = Setup(
     load=(0.1, 1.0),
 )  # fmt: skip
 WITH_EFFORT = replace(
-    SETUP, name=EFFORT, motion=_interpolated, sensors=Sensors(noise=0.0002, step=0.0003, effort_noise=0.1)
+    SETUP, name=EFFORT, motion=_interpolated, sensors=Sensors(noise=0.0002, step=0.0003, effort_noise=0.3)
 )
 
 
