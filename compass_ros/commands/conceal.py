@@ -34,7 +34,8 @@ def conceal(
         float | None, typer.Option(min=1e-6, help="air hockey: what is left of an effect after the best parameters [m]")
     ] = None,
     forms: Annotated[
-        Literal["other", "like"], typer.Option(help="air hockey: other: formulas unlike the library's; like: as there")
+        Literal["other", "like", "foreign"],
+        typer.Option(help="air hockey: formulas unlike the library's, like them, or a table of another engine"),
     ] = "other",
     kind: Annotated[
         Literal["none", "one", "two", "outside"] | None, typer.Option(help="how much is missing; else drawn")
@@ -45,11 +46,15 @@ def conceal(
     from compass_ros.cells import load
     from compass_ros.concealed.world import Wishes
     from compass_ros.errors import ConfigError
-    from compass_ros.worlds.scenes import MODULES
+    from compass_ros.worlds.scenes import MODULES, TABLES
     from compass_ros.worlds.world import Asked
 
-    names = tuple(effect or ())
-    if load(cell).name in MODULES:
+    names, name = tuple(effect or ()), load(cell).name
+    if forms == "foreign" and name in TABLES:
+        if (noise, rms) != ("white", None):
+            raise ConfigError(f"{cell}: --noise and --rms are not of --forms foreign")
+        path = write_world(cell, Asked(seed, kind, names), out, answers)
+    elif name in MODULES or forms == "foreign":
         if (noise, rms, forms) != ("white", None, "other"):
             raise ConfigError(f"{cell}: --noise, --rms and --forms are of the cell air_hockey alone")
         path = write_world(cell, Asked(seed, kind, names), out, answers)

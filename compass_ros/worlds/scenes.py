@@ -16,11 +16,14 @@ MODULES: Mapping[str, str] = {
     "bouncing_ball": "bounce.scene",
     "pushed_bar": "push.scene",
 }
+TABLES: Mapping[str, str] = {"air_hockey": "table.scene"}
+"""The same of cells that have worlds on the suite's own scene too (`concealed/`): asked for by `--forms foreign`."""
 
 
 def scene_of(cell: str) -> Scene | None:
     """The scene of a cell by its name; None where it has none."""
-    if cell not in MODULES:
+    module = {**MODULES, **TABLES}.get(cell)
+    if module is None:
         return None
-    scene: Scene = import_module(f"compass_ros.worlds.{MODULES[cell]}").conceal
+    scene: Scene = import_module(f"compass_ros.worlds.{module}").conceal
     return scene
