@@ -17,8 +17,6 @@ from compass_ros.cells import Cell
 from compass_ros.checks.check import check
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery, data_bad, discover, fit_failed, not_evaluated
-from compass_ros.discovery.discover import of_joints
-from compass_ros.discovery.unseen import unexpected
 from compass_ros.errors import DataError
 from compass_ros.estimation import estimate_parameters
 from compass_ros.posing import Yardstick, pose
@@ -56,37 +54,26 @@ def calibrate(
     def noted(result: Result) -> Result:
         return replace(result, warnings=(*told, *checked.said, *result.warnings), left_out=left_out)
 
-    for turn in range(2):
-        fit, held_out = split(used, config, turn)
-        most = config.windows if cell.spec.windows else config.episodes
-        data = recordings(cell, evenly(windows(cell, fit), most))
-        judge = recordings(cell, evenly(windows(cell, held_out or fit), config.episodes))
-        judge = judge.numbered(len(data.names))
-        simulator = simulator.driven(data.drives + judge.drives)
-        noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
-        yardsticks = Yardstick(simulator, data, noise), Yardstick(simulator, judge, noise)
-        problem, unseen = pose(simulator, data, noise, yardsticks[0]), pose(simulator, judge, noise).likelihood
+    fit, held_out = split(used, config)
+    most = config.windows if cell.spec.windows else config.episodes
+    data = recordings(cell, evenly(windows(cell, fit), most))
+    judge = recordings(cell, evenly(windows(cell, held_out or fit), config.episodes)).numbered(len(data.names))
+    simulator = simulator.driven(data.drives + judge.drives)
+    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
+    yardsticks = Yardstick(simulator, data, noise), Yardstick(simulator, judge, noise)
+    problem, unseen = pose(simulator, data, noise, yardsticks[0]), pose(simulator, judge, noise).likelihood
 
-        estimate, refined = estimate_parameters(problem, config, steady.share(0.0, first))
-        if checked.bad:
-            found = data_bad(checked.sentence)
-            break
-        if not config.discover:
-            found = not_evaluated("it was switched off")
-            break
+    estimate, refined = estimate_parameters(problem, config, steady.share(0.0, first))
+    if checked.bad:
+        found = data_bad(checked.sentence)
+    elif not config.discover:
+        found = not_evaluated("it was switched off")
+    else:
         if keep is not None:
             begun = not_evaluated("the search has not ended")
             known = assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, begun, yardsticks)
             keep(noted(known), begun)
-        may_turn = turn == 0 and not of_joints(simulator) and 0 < 2 * len(held_out) <= len(used)
-        rest = steady.share(first, 1.0)
-        found = searched(simulator, problem, estimate, refined, unseen, noise, config.seed, may_turn, rest)
-        if not (may_turn and found.untaught):
-            break
-        told.append(
-            f"what fits the other episodes to the noise does not predict {', '.join(judge.names)}: these are fitted, "
-            "others are held out"
-        )
+        found = searched(simulator, problem, estimate, refined, unseen, noise, config.seed, steady.share(first, 1.0))
     result = assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, found, yardsticks)
     if estimate.note:
         told.append(estimate.note)
@@ -104,17 +91,11 @@ def searched(
     unseen: Likelihood,
     noise: Noise,
     seed: int,
-    may_turn: bool,
     report: Report,
 ) -> Discovery:
-    """What is missing, or why that cannot be said: the calibration stands either way.
-
-    `may_turn`: not looked for where what fits these episodes to the noise does not predict the others.
-    """
+    """What is missing, or why that cannot be said: the calibration stands either way."""
     try:
         refined = refined or refine(problem.likelihood, estimate.values)
-        if may_turn and unexpected(unseen, refined):
-            return replace(not_evaluated("other episodes are needed"), untaught=True)
         return discover(simulator, refined, unseen, noise, seed, report)
     except DataError as error:
         return not_evaluated(str(error))
@@ -133,11 +114,8 @@ def evenly(episodes: Sequence[Episode], most: int) -> list[Episode]:
     return [ordered[i] for i in np.round(np.linspace(0, len(ordered) - 1, most)).astype(int)]
 
 
-def split(episodes: Sequence[Episode], config: CalibrationConfig, turn: int = 0) -> tuple[list[Episode], list[Episode]]:
-    """Episodes to fit and episodes that are never fitted; the choice depends on names and seed alone.
-
-    At the next `turn` others are held out.
-    """
+def split(episodes: Sequence[Episode], config: CalibrationConfig) -> tuple[list[Episode], list[Episode]]:
+    """Episodes to fit and episodes that are opened after the verdict; the choice depends on names and seed alone."""
     if not episodes:
         raise DataError("no episodes: nothing to calibrate with")
 
@@ -145,6 +123,6 @@ def split(episodes: Sequence[Episode], config: CalibrationConfig, turn: int = 0)
         return hashlib.sha256(f"{config.seed}/{episode.name}".encode()).hexdigest()
 
     count = round(config.held_out_share * len(episodes)) if len(episodes) > 1 else 0
-    chosen = {e.name for e in sorted(episodes, key=rank)[turn * count : (turn + 1) * count]}
+    chosen = {e.name for e in sorted(episodes, key=rank)[:count]}
     ordered = sorted(episodes, key=lambda e: (e.name, e.start_ns))
     return [e for e in ordered if e.name not in chosen], [e for e in ordered if e.name in chosen]

@@ -372,6 +372,19 @@ class Region:
     radius_m: float
 
 
+DependsOn = Literal["place", "velocity", "time"]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A range of what something is a function of."""
+
+    quantity: Literal["angle", "position", "speed"]
+    low: float
+    high: float
+    unit: str
+
+
 @dataclass(frozen=True)
 class Where:
     object: str
@@ -381,6 +394,10 @@ class Where:
     region: Region | None = None
     time_s: tuple[float, float] | None = None
     """From, to, since the command."""
+    interval: Interval | None = None
+    """Where along the motion most of it sits; None: everywhere."""
+    depends_on: DependsOn | None = None
+    """What it is a function of, where that is clear; `time`: of neither place nor velocity."""
 
 
 @dataclass(frozen=True)

@@ -156,21 +156,6 @@ def test_the_values_of_the_truth_reach_the_noise_floor(episodes: list[Episode], 
     assert at_truth.rmse_m == pytest.approx(result.noise_floor_m, rel=0.1)
 
 
-def test_what_the_fitted_episodes_do_not_show_is_fitted_next(
-    episodes: list[Episode], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Once: a verdict that comes to the same again stands."""
-    monkeypatch.setattr(pipeline, "refine", lambda *_: None)
-    monkeypatch.setattr(pipeline, "unexpected", lambda *_: False)
-    monkeypatch.setattr(pipeline, "discover", lambda *_: replace(not_evaluated("a test"), untaught=True))
-    result, _ = calibrate(episodes, cell(), replace(CONFIG, discover=True))
-    first, second = (split(episodes, CONFIG, turn)[1] for turn in (0, 1))
-    assert result.held_out == tuple(e.name for e in second)
-    assert set(result.held_out).isdisjoint(e.name for e in first)
-    names = ", ".join(e.name for e in first)
-    assert any(f"does not predict {names}: these are fitted, others are held out" in w for w in result.warnings)
-
-
 @pytest.mark.parametrize("name", ["compass", "npdr", "exi-net", "tune-net", "mujoco-sysid", "cma-es", "random"])
 def test_no_method_ends_farther_than_it_began(
     episodes: list[Episode], monkeypatch: pytest.MonkeyPatch, name: str

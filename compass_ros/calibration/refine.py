@@ -137,17 +137,46 @@ def refine(likelihood: Likelihood, values: Floats, watch: Watch = lambda *_: Tru
     return polish(calmed(likelihood, fit.linear), fit.point, watch)
 
 
-def growing(likelihood: Likelihood, values: Floats, held: Ints = NONE) -> Iterator[tuple[Likelihood, Fit]]:
-    """The beginning of each episode and the fit of the strongest parameters to it, longer from one to the next.
+@dataclass(frozen=True)
+class Strongest:
+    """Parameters that a fit on a growing horizon begins with."""
 
-    Those `held` stay as they are: a beginning of half a second says nothing of a frequency.
-    """
-    point = start(likelihood, values)
+    which: Ints
+    """(s,) indices."""
+    steps: Floats
+    """(P,) for differences, in prior widths."""
+
+    def beside(self, values: Floats, more: Ints, steps: Floats) -> Strongest:
+        """The same, and (n,) `more` of the (P + q,) values of a wider model with their steps."""
+        wide = np.ones(len(values))
+        wide[: len(self.steps)] = self.steps
+        wide[more] = steps
+        return Strongest(np.concatenate([self.which, more]), wide)
+
+
+def strongest(likelihood: Likelihood, values: Floats) -> Strongest:
+    """Those that move the recordings most at (P,) values."""
     few = some(likelihood)
     first, share_asked = sensitivity(few, start(few, values)), len(few.inputs) / len(likelihood.inputs)
-    strong = np.setdiff1d(first.felt(STRONG * np.sqrt(share_asked), STRONG_SHARE), held)
-    steps, onset = first.steps.copy(), None
-    for share in likelihood.horizons:
+    return Strongest(first.felt(STRONG * np.sqrt(share_asked), STRONG_SHARE), first.steps.copy())
+
+
+def growing(
+    likelihood: Likelihood,
+    values: Floats,
+    held: Ints = NONE,
+    begun: Strongest | None = None,
+    horizons: tuple[float, ...] = (),
+) -> Iterator[tuple[Likelihood, Fit]]:
+    """The beginning of each episode and the fit of the strongest parameters to it, longer from one to the next.
+
+    Those `held` stay as they are: a beginning of half a second says nothing of a frequency. `begun`: the strongest
+    ones, where they are known. `horizons`: other shares of the episodes than all that the likelihood has.
+    """
+    point = start(likelihood, values)
+    begun = begun or strongest(likelihood, values)
+    strong, steps, onset = np.setdiff1d(begun.which, held), begun.steps.copy(), None
+    for share in horizons or likelihood.horizons:
         part = likelihood.until(share * float(likelihood.time_s.max()))
         robust = max(ROBUST, 3.0 * typical_residual(part, point))
         last = share == likelihood.horizons[-1]

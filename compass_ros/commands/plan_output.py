@@ -17,7 +17,7 @@ from rich.table import Table
 from rich.text import Text
 
 from compass_ros.cells import Cell
-from compass_ros.discovery.plan import TWIN, Plan, Seen, Visible, widest
+from compass_ros.planning.plan import TWIN, Plan, Seen, Visible, widest
 from compass_ros.planning.shots import Planned
 from compass_ros.reporting.atomic import write_text
 from compass_ros.reporting.figures import STYLE, save

@@ -45,13 +45,17 @@ class Free:
     """Of the same with a free discrepancy, of forces or of signals."""
     of_forces: bool
     """Which of the two has the higher evidence."""
+    pushes: Floats
+    """(E, K, S) posterior mean of the most probable one of forces."""
 
 
 def free(response: Response) -> Free:
     """The model of a response with a discrepancy of any size, of forces or of signals."""
     alone, *found = evidences(response.tangent, [None, *(spread(response, size) for size in free_sizes(response))])
     logs = np.array([f.log for f in found])
-    return Free(alone.log, log_sum(logs - np.log(len(logs))), int(np.argmax(logs)) < len(FREE))
+    best, moments = int(np.argmax(logs)), len(response.kicks.moments_s)
+    pushes = found[int(np.argmax(logs[: len(FREE)]))].pushes.reshape(-1, moments, len(response.unit))
+    return Free(alone.log, log_sum(logs - np.log(len(logs))), best < len(FREE), pushes)
 
 
 def free_sizes(response: Response) -> list[Floats]:

@@ -16,7 +16,8 @@ concave in r^2): for each such choice the formula gives a lower bound of the log
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -91,6 +92,12 @@ class Normal:
         gram = np.stack([a.T @ b for a, b in zip(weighted, columns, strict=True)])
         constant = float(np.sum(robust_loss(residual, tangent.robust) - weight * residual**2))
         return Normal(gram / tangent.correlation_time, constant / tangent.correlation_time)
+
+    def scaled(self, stds: Floats) -> Normal:
+        """The same where the first parameters' priors are (n,) times as wide."""
+        factor = np.ones(self.gram.shape[1])
+        factor[: len(stds)] = stds
+        return Normal(self.gram * factor[:, None] * factor, self.constant)
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,13 +194,26 @@ def residual_of(tangent: Tangent, solved: Solved) -> Floats:
     return np.asarray(left)
 
 
-def evidences(tangent: Tangent, spreads: list[Floats | None]) -> list[Solved]:
+def evidences(tangent: Tangent, spreads: Sequence[Floats | None]) -> list[Solved]:
     """Of several discrepancies, each with the weights of the residuals that the best of them leaves."""
-    found = [solve(tangent, tangent.normal, spread) for spread in spreads]
+    return _weighed(tangent, lambda normal: [solve(tangent, normal, spread) for spread in spreads])
+
+
+def widths(tangent: Tangent, stds: Sequence[Floats]) -> list[Solved]:
+    """The same without a discrepancy, of several widths of the priors: (p,) times as wide as they are."""
+
+    def at(normal: Normal) -> list[Solved]:
+        found = [solve(tangent, normal.scaled(std), None) for std in stds]
+        return [replace(f, parameters=f.parameters * std) for f, std in zip(found, stds, strict=True)]
+
+    return _weighed(tangent, at)
+
+
+def _weighed(tangent: Tangent, at: Callable[[Normal], list[Solved]]) -> list[Solved]:
+    found = at(tangent.normal)
     for _ in range(ROUNDS):
         best = max(found, key=lambda s: s.log)
-        normal = Normal.of(tangent, residual_of(tangent, best))
-        again = [solve(tangent, normal, spread) for spread in spreads]
+        again = at(Normal.of(tangent, residual_of(tangent, best)))
         if max(s.log for s in again) < best.log + SLIGHT:
             break
         found = [max(pair, key=lambda s: s.log) for pair in zip(found, again, strict=True)]

@@ -8,6 +8,7 @@ values falls by 1/2 g' S^-1 g, where S = T'T and g = T'r after the projection of
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from compass_ros.calibration.least_squares import robust_weight
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.response import Response
 from compass_ros.discovery.shapes import best_shapes
-from compass_ros.types import Floats
+from compass_ros.types import Floats, Ints
 
 SIGMAS = 5.0
 """Standard deviations from which something is seen."""
@@ -68,15 +69,29 @@ class FirstOrder:
         self._weight = robust_weight(tangent.residual, tangent.robust) / tangent.correlation_time
         self._own = gram[:, own]
         self._taken = np.linalg.inv(inner)
+        self._kept: dict[tuple[int, ...], tuple[Floats, Floats, Floats]] = {}
 
-    def of_accelerations(self, weights: Floats) -> tuple[Floats, Floats]:
-        """(n, n) S and (n,) g of (E, K S, n) accelerations."""
-        p, pushes = self._parameters, slice(self._parameters, -1)
-        moved = self._gram[:, pushes, pushes] @ weights
-        gram = np.einsum("ehn,ehm->nm", weights, moved)
-        cross = np.einsum("ehn,ehp->np", weights, self._gram[:, pushes, :p])
-        pull = np.einsum("ehn,eh->n", weights, self._gram[:, pushes, -1])
-        return self._projected(gram, cross, pull)
+    def of_accelerations(self, weights: Floats, pushes: Ints) -> tuple[Floats, Floats]:
+        """(n, n) S and (n,) g of (E, h, n) accelerations at some (h,) of the pushes."""
+        gram, cross, pull = self._products(tuple(pushes))
+        moved = gram @ weights
+        return self._projected(
+            np.tensordot(weights, moved, ((0, 1), (0, 1))),
+            np.tensordot(weights, cross, ((0, 1), (0, 1))),
+            np.tensordot(weights, pull, ((0, 1), (0, 1))),
+        )
+
+    def _products(self, pushes: tuple[int, ...]) -> tuple[Floats, Floats, Floats]:
+        """(E, h, h) of pushes among each other, (E, h, p) with parameters, (E, h) with the residual."""
+        if pushes not in self._kept:
+            p, own = self._parameters, self._parameters + np.array(pushes)
+            gram = self._gram
+            self._kept[pushes] = (
+                np.ascontiguousarray(gram[:, own[:, None], own]),
+                np.ascontiguousarray(gram[:, own, :p]),
+                np.ascontiguousarray(gram[:, own, -1]),
+            )
+        return self._kept[pushes]
 
     def of_columns(self, columns: Floats) -> tuple[Floats, Floats]:
         """The same of (E, D, n) changes of the residual."""
@@ -103,33 +118,43 @@ class FirstOrder:
     # --- laws of forces
 
     def _of_forces(self, candidate: Candidate) -> list[Ranked]:
-        quantities = candidate.attached.effect.quantities
-        shapes = best_shapes(quantities, lambda one: self._amplitudes(candidate, one)[1], STARTS, EVALUATIONS)
-        return [self._at(candidate, one) for one in shapes]
+        quantities, law = candidate.attached.effect.quantities, self._units(candidate)
+        shapes = best_shapes(quantities, lambda one: self._amplitudes(candidate, one, law(one))[1], STARTS, EVALUATIONS)
+        return [self._at(candidate, one, law(one)) for one in shapes]
 
-    def _units(self, candidate: Candidate, shapes: Floats) -> Floats:
-        """(E, K S, a) accelerations per modest size of each amplitude, at (q,) shapes."""
-        out = []
-        for i, q in enumerate(candidate.attached.effect.quantities):
-            if q.amplitude:
-                numbers = shapes.copy()
-                numbers[i] = q.scale
-                pushed = self.response.accelerations(candidate.attached, numbers)
-                out.append(pushed.reshape(len(self._gram), -1))
-        return np.stack(out, axis=2)
+    def _units(self, candidate: Candidate) -> Callable[[Floats], Floats]:
+        """At (q,) shapes, (E, h, a) accelerations per modest size of each amplitude, of the pushes of its sites."""
+        law, quantities = self.response.law(candidate.attached), candidate.attached.effect.quantities
 
-    def _amplitudes(self, candidate: Candidate, shapes: Floats) -> tuple[Floats, float]:
+        def at(shapes: Floats) -> Floats:
+            out = []
+            for i, q in enumerate(quantities):
+                if q.amplitude:
+                    numbers = shapes.copy()
+                    numbers[i] = q.scale
+                    out.append(law(numbers).reshape(len(self._gram), -1))
+            return np.stack(out, axis=2)
+
+        return at
+
+    def _pushes(self, candidate: Candidate) -> Ints:
+        """(h,) pushes of a law's sites: moments, then directions."""
+        response = self.response
+        moments, directions = len(response.kicks.moments_s), len(response.unit)
+        return np.ravel(np.arange(moments)[:, None] * directions + response.pushed_by(candidate.attached))
+
+    def _amplitudes(self, candidate: Candidate, shapes: Floats, units: Floats) -> tuple[Floats, float]:
         """(q,) numbers with the best amplitudes at a shape, and the gain."""
         low, high, scale = _bounds(candidate)
-        weights = self._units(candidate, shapes) / scale
-        sizes, gain = best_sizes(*self.of_accelerations(weights), low, high, WIDTH * scale)
+        moved = self.of_accelerations(units / scale, self._pushes(candidate))
+        sizes, gain = best_sizes(*moved, low, high, WIDTH * scale)
         numbers = shapes.copy()
         numbers[candidate.attached.amplitudes] = sizes
         return numbers, gain
 
-    def _at(self, candidate: Candidate, shapes: Floats) -> Ranked:
-        numbers, gain = self._amplitudes(candidate, shapes)
-        columns = self.response.tangent.pushes @ (WIDTH * self._units(candidate, shapes))
+    def _at(self, candidate: Candidate, shapes: Floats, units: Floats) -> Ranked:
+        numbers, gain = self._amplitudes(candidate, shapes, units)
+        columns = self.response.tangent.pushes[:, :, self._pushes(candidate)] @ (WIDTH * units)
         return self._judged(candidate, numbers, columns, gain)
 
     def _judged(self, candidate: Candidate, numbers: Floats, columns: Floats, gain: float) -> Ranked:

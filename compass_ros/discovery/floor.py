@@ -2,14 +2,12 @@
 
 `none` means that what is left is noise. An error in held-out episodes of TWICE the noise floor is three quarters
 something else in mean square, so it is never `none` beside it. It may be noise that neither stillness nor calm flight
-show (frames that are lost, stamps that are a little off, blur); then the floor is higher than it was taken for. It may
-be what a collision makes of the errors that parameters have anyway; then these recordings cannot say. Or something is
-missing for which no candidate stands.
+show (frames that are lost, stamps that are a little off, blur); then the floor is higher than it was taken for. Or
+something is missing for which no law stands.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -18,16 +16,10 @@ from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise, correlation_of
 from compass_ros.calibration.residuals import residual_at
-from compass_ros.discovery.followed import doubted
-from compass_ros.types import Mismatch, Verdict, Where
+from compass_ros.types import Mismatch, Where
 
 TWICE = 2.0
 """Held-out error over noise floor from which what is left is not called noise."""
-UNEXPLAINED: Mapping[Verdict, str] = {
-    "none": "Nothing is missing that these recordings could show",
-    "unknown": "Something differs that no known effect explains",
-    "fit_failed": "No verdict, for these episodes make every error too large to tell what is missing",
-}
 EVERYWHERE = Where("all", "all", "all")
 
 
@@ -35,11 +27,11 @@ def shown_noise(noise: Noise, likelihood: Likelihood, fit: Fit) -> Noise:
     """The noise with what the fitted episodes show of it beyond what the recordings alone did.
 
     What a model misses follows the motion; in second differences of neighbouring frames it is gone, and what is left of
-    white noise is 6 times its variance, of noise of correlation r (AR(1)) that less a share (4 r - r^2) / 3. Frames of
-    episodes that the fit has lost say nothing. Outliers count as far away as they are.
+    white noise is 6 times its variance, of noise of correlation r (AR(1)) that less a share (4 r - r^2) / 3. Outliers
+    count as far away as they are.
     """
     residual = residual_at(likelihood, fit.point)
-    seen = ~np.isnan(likelihood.measured) & (doubted(likelihood, residual) == 1.0)[:, :, None]
+    seen = ~np.isnan(likelihood.measured)
     missed = np.where(seen, residual * likelihood.sigma, np.nan)
     change = (missed[:, :-2] - 2 * missed[:, 1:-1] + missed[:, 2:]).reshape(-1, missed.shape[2])
     count = np.maximum(np.sum(~np.isnan(change), axis=0), 1)
@@ -49,21 +41,9 @@ def shown_noise(noise: Noise, likelihood: Likelihood, fit: Fit) -> Noise:
     return replace(noise, with_outliers=np.maximum(noise.rms, np.sqrt(noise.sigma**2 + more)))
 
 
-def left_over(error: float, floor: float, surprising: bool) -> Verdict:
-    """What a held-out error [m or rad] beside a noise floor means where no effect stands out.
-
-    Args:
-        surprising: Whether the held-out episodes surprise the model beyond what noise, and what it does not know of its
-            parameters, explain.
-    """
-    if error < TWICE * floor:
-        return "none"
-    return "unknown" if surprising else "fit_failed"
-
-
 def honest(mismatch: Mismatch, error: float, floor: float) -> Mismatch:
     """The answer as it may be published beside these numbers: `none` never beside an error of TWICE the floor."""
-    if mismatch.verdict != "none" or left_over(error, floor, True) == "none":
+    if mismatch.verdict != "none" or error < TWICE * floor:
         return mismatch
-    sentence = f"{UNEXPLAINED['unknown']}: held-out error {error / floor:.1f} times the noise."
+    sentence = f"Something differs that no known law explains: held-out error {error / floor:.1f} times the noise."
     return replace(mismatch, verdict="unknown", where=EVERYWHERE, sentence=sentence)

@@ -1,4 +1,4 @@
-"""A model with laws, fitted together with all parameters: from its parent's fit, or from the cell's first guess."""
+"""A model with laws, fitted together with all parameters."""
 
 from __future__ import annotations
 
@@ -8,26 +8,18 @@ from functools import cached_property
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, Point, cost, extended, minimise
+from compass_ros.calibration.least_squares import Fit, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import freed, growing, settled
-from compass_ros.calibration.residuals import variances
+from compass_ros.calibration.residuals import jackknife, variances
 from compass_ros.discovery.discrepancy import Free, free, spread, with_law
-from compass_ros.discovery.evidence import solve
-from compass_ros.discovery.first_order import WIDTH, Ranked
-from compass_ros.discovery.joint import widened
+from compass_ros.discovery.first_order import WIDTH
 from compass_ros.discovery.response import Response, respond
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
-from compass_ros.types import Floats, Ints
+from compass_ros.types import Floats
 
-_SHARES = (0.15, 0.4, 0.7, 1.0)
-"""Parts of the first-order step from which a fit begins, the best of them."""
-EPISODES = 9
-"""Episodes, or windows, to which the models of a race are fitted until it is over: a budget; of twelve recordings all
-that are not held out."""
-_SLIGHT = 0.3
-"""Gain [log likelihood] of a step that is the last one: models are compared by whole units."""
+ERROR_BARS = 2.0
+"""Error bars from zero within which a law is not named: a 95 % interval that holds its absence."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,95 +115,53 @@ class Hypothesis:
             yield attached, slice(at, at + size)
             at += size
 
+    @cached_property
+    def distinct(self) -> bool:
+        """Whether each of its laws lies more than ERROR_BARS from zero, all its amplitudes together.
+
+        Error bars as the noise leaves them, and as the episodes disagree. Along directions of which the recordings say
+        less than the prior nothing is judged: where only ratios show, all numbers are unsure by one common factor, and
+        none of them is near zero for that. A scatter is judged by its episodes.
+        """
+        free, p = self.fit.free, len(self.fit.free)
+        hessian, _ = normal_equations(self.likelihood, self.fit.point, self.fit.linear, free, self.fit.robust)
+        prior = np.eye(len(hessian))
+        errors = np.linalg.inv((hessian - prior) / self.likelihood.correlation_time + prior)[:p, :p]
+        told, axes = np.linalg.eigh(np.linalg.inv(errors) - np.eye(p))
+        axes = axes[:, told > 1.0]
+        away = ((self.fit.point.values - self.likelihood.prior_mean) / self.likelihood.prior_std)[free]
+        bars = [axes.T @ cov @ axes for cov in (errors, jackknife(self.likelihood, self.fit))]
+        for attached, numbers in self.own():
+            own = np.isin(free, numbers.start + np.flatnonzero(attached.amplitudes))
+            if not attached.effect.scattered and any(_within(away[own], axes[own] @ c @ axes[own].T) for c in bars):
+                return False
+        return True
+
     @property
     def rho(self) -> float:
         """Posterior mean of the discrepancy's size, as a share of the laws' own."""
         return self._with_law[1] if self.laws else 0.0
 
 
-def from_parent(parent: Hypothesis, ranked: Ranked, iterations: int) -> Hypothesis:
-    """Fitted from the first-order solution about its parent's fit."""
-    attached = ranked.candidate.attached
-    simulator, likelihood = widened(parent.simulator, parent.likelihood, [attached])
-    amplitude = attached.amplitudes
-    found = solve_beside(parent, ranked)
-    tuned, base = parent.fit.free, parent.fit.point
-    starts = []
-    for share in _SHARES:
-        values = base.values.copy()
-        values[tuned] += share * found * parent.likelihood.prior_std[tuned]
-        numbers = np.where(amplitude, share * ranked.numbers, ranked.numbers)
-        values = np.concatenate([values, numbers])
-        starts.append(Point(np.clip(values, likelihood.low, likelihood.high), base.launch, np.inf))
-    costs, residuals = cost(likelihood, starts, parent.fit.robust)
-    best = int(np.argmin(costs))
-    everything = np.concatenate([tuned, len(base.values) + np.arange(len(amplitude))])
-    linear = extended(parent.fit.linear, likelihood, starts[best], residuals[best], everything)
-    fit = minimise(likelihood, starts[best], everything, iterations, parent.fit.robust, 1.0, linear, fresh=False)
-    return Hypothesis((*parent.laws, attached), simulator, likelihood, fit, parent.response)
+def widened(simulator: Simulator, likelihood: Likelihood, added: Sequence[Attached]) -> tuple[Simulator, Likelihood]:
+    """A simulator and likelihood with more effects; priors wide beside a modest effect, bounded by what is physical."""
+    wider = simulator.with_effects([*simulator.effects, *added])
+    quantities = [q for a in added for q in a.effect.quantities]
+    mean = [0.0 if q.amplitude else q.start for q in quantities]
+    std = [WIDTH * q.scale if q.amplitude else (q.high - q.low) / 4 for q in quantities]
+    more = sum(a.effect.scattered for a in added)
+    return wider, replace(
+        likelihood,
+        predict=wider.observe,
+        predict_alike=wider.observe_alike,
+        parameters=wider.parameters,
+        inputs=np.pad(likelihood.inputs, ((0, 0), (0, more))),
+        launch_std=np.pad(likelihood.launch_std, (0, more)),
+        prior_mean=np.concatenate([likelihood.prior_mean, mean]),
+        prior_std=np.concatenate([likelihood.prior_std, std]),
+    )
 
 
-def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:
-    """(p,) first-order change of the parent's parameters beside a law at its first-order numbers."""
-    tangent = parent.response.tangent
-    sizes = np.array([WIDTH * q.scale for q in ranked.candidate.attached.effect.quantities if q.amplitude])
-    moved = ranked.columns @ (ranked.numbers[ranked.candidate.attached.amplitudes] / sizes)
-    beside = replace(tangent, residual=tangent.residual + moved)
-    change = np.zeros(len(parent.fit.free))
-    change[parent.response.inside] = solve(beside, beside.normal, None).parameters
-    return change
-
-
-def race(parent: Hypothesis, starts: Sequence[tuple[Attached, Floats]]) -> list[Hypothesis]:
-    """The best two of models with one more law each, fitted from the cell's first guess by successive halving.
-
-    A simulator without a law has bent other parameters to stand for it, and from there a fit may end in a valley beside
-    the right one. All models are fitted to the beginning of some episodes, the better half of them to more of it, and
-    so on; the last ones to all there is. `starts`: each law with its (q,) numbers.
-    """
-    count = len(parent.likelihood.inputs)
-    rows = np.unique(np.linspace(0, count - 1, min(count, EPISODES)).astype(int))
-    runners = [_runner(parent, attached, numbers, rows) for attached, numbers in starts]
-    alive = list(range(len(runners)))
-    values: dict[int, Floats] = {}
-    for _ in parent.likelihood.horizons:
-        costs = {}
-        for i in alive:
-            _, fit = next(runners[i])
-            costs[i], values[i] = fit.point.cost, fit.point.values
-        alive = sorted(alive, key=lambda i: costs[i])[: max((len(alive) + 1) // 2, 2)]
-    return [_whole(parent, starts[i][0], values[i]) for i in alive]
-
-
-def _runner(
-    parent: Hypothesis, attached: Attached, numbers: Floats, rows: Ints
-) -> Iterator[tuple[Likelihood, Fit]]:
-    """Fits of one model to some episodes, longer from one to the next; shapes stay as they are."""
-    simulator, likelihood = widened(parent.simulator, parent.likelihood, [attached])
-    values = np.concatenate([parent.likelihood.prior_mean, numbers])
-    first, own = len(simulator.cell.parameters), len(parent.fit.point.values)
-    values[first:own] = parent.fit.point.values[first:]
-    amplitudes = np.concatenate([a.amplitudes for a in (*parent.laws, attached)])
-    return growing(likelihood.of(rows), values, first + np.flatnonzero(~amplitudes))
-
-
-def _whole(parent: Hypothesis, attached: Attached, values: Floats) -> Hypothesis:
-    """A model fitted to all episodes from (P + q,) values."""
-    simulator, likelihood = widened(parent.simulator, parent.likelihood, [attached])
-    of_laws = np.arange(len(simulator.cell.parameters), len(values))
-    point = Point(values, np.zeros_like(likelihood.inputs), np.inf)
-    fit = freed(likelihood, point, 5, parent.fit.robust, of_laws)[1]
-    fit = minimise(likelihood, fit.point, fit.free, 5, parent.fit.robust, _SLIGHT)
-    return Hypothesis((*parent.laws, attached), simulator, likelihood, fit)
-
-
-def finished(hypothesis: Hypothesis) -> Hypothesis:
-    """At its optimum, with exact differences there."""
-    return replace(hypothesis, fit=settled(hypothesis.likelihood, hypothesis.fit), near=None)
-
-
-def further(hypothesis: Hypothesis, iterations: int) -> Hypothesis:
-    """Some more steps, with differences at the end."""
-    fit = hypothesis.fit
-    fit = minimise(hypothesis.likelihood, fit.point, fit.free, iterations, fit.robust, _SLIGHT, fit.linear)
-    return replace(hypothesis, fit=fit, near=None)
+def _within(away: Floats, errors: Floats) -> bool:
+    """Whether (n,) amplitudes are within ERROR_BARS of zero, with their (n, n) errors."""
+    return bool(away @ np.linalg.lstsq(errors, away, rcond=None)[0] < ERROR_BARS**2) and bool(np.any(errors))

@@ -11,48 +11,23 @@ from compass_ros.calibration.least_squares import Fit, normal_equations, robust_
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.evidence import solve
 from compass_ros.discovery.hypothesis import Hypothesis
-from compass_ros.discovery.joint import Joint
-from compass_ros.discovery.screen import Space
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.numerics import other_numerics
 from compass_ros.types import Floats
 
-MOSTLY = 0.5
-"""Share of the excess from which it is put down to numerics."""
 
-
-def numerical_cause(space: Space, excess: float) -> str:
-    """What a change of the simulator's numerics explains of `excess` [log likelihood], as a sentence; else empty.
-
-    The calibrated simulator plays the fitted episodes again with other numerics. What that moves, less what the
-    parameters could take, is taken as it is, with amplitude one: physics has no business in it.
-    """
-    for what, options in other_numerics(space.simulator):
-        share = _gain(space, options) / max(excess, 1e-9)
-        if share > MOSTLY:
-            return f"{100 * min(share, 1.0):.0f} % of what is left goes away with {what}"
-    return ""
-
-
-def shift(joint: Joint) -> Floats:
+def shift(model: Hypothesis) -> Floats:
     """(p,) how far the free quantities of a fit move when the time step is halved [prior standard deviations].
 
     What an effect is said to be is a claim about physics, and a simulator with a finite step says it not quite right.
     """
-    simulator, likelihood, fit = joint.simulator, joint.likelihood, joint.fit
+    simulator, likelihood, fit = model.simulator, model.likelihood, model.fit
     moved = _moved(simulator, likelihood, fit, {"timestep": 0.5 * simulator.options.timestep})
     weight = robust_weight(fit.linear.residual, fit.robust)
     jacobian = fit.linear.jacobian
     hessian, _ = normal_equations(likelihood, fit.point, fit.linear, fit.free, fit.robust)
     pull = np.einsum("efcp,efc->p", jacobian, weight * moved)
     return np.asarray(-np.linalg.solve(hessian, np.pad(pull, (0, len(hessian) - len(pull)))))[: len(pull)]
-
-
-def _gain(space: Space, options: Mapping[str, float]) -> float:
-    """Fall of the cost with other numerics, after the parameters have adapted to first order."""
-    change = _moved(space.simulator, space.likelihood, space.fit, options).reshape(space.weight.shape) * space.weight
-    matrix, pull = space.reduced_tangent(change.reshape(-1, 1))
-    return -float(pull[0] + 0.5 * matrix[0, 0])
 
 
 def _moved(simulator: Simulator, likelihood: Likelihood, fit: Fit, options: Mapping[str, float]) -> Floats:

@@ -8,8 +8,7 @@ from compass_ros.calibration.least_squares import Fit, linearise, start
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import ROBUST, scaled, with_roughness
 from compass_ros.cells import Cell
-from compass_ros.discovery.impulses import Impulses, impulses
-from compass_ros.discovery.screen import Space
+from compass_ros.discovery.response import Response, respond
 from compass_ros.errors import ConfigError, DataError
 from compass_ros.simulation import Simulator
 from compass_ros.types import Bools, Floats
@@ -25,7 +24,7 @@ _DRAWS = 4
 _TRIES = 40
 
 
-def linearised(simulator: Simulator, inputs: Floats, rate_hz: float, sigma: float) -> Space:
+def linearised(simulator: Simulator, inputs: Floats, rate_hz: float, sigma: float) -> Response:
     """Perfect recordings of (E, A) shots at the defaults, with every tangent; `sigma` [m] of one measurement.
 
     About 240 rollouts a shot for 64 parameters. What the simulator does roughly, at contacts, counts as noise.
@@ -35,7 +34,7 @@ def linearised(simulator: Simulator, inputs: Floats, rate_hz: float, sigma: floa
     fit = Fit(point, linearise(likelihood, point, free, np.full(len(free), 0.05)), free, ROBUST, 0, True)
     rough = with_roughness(likelihood, fit)
     fit = Fit(point, scaled(fit.linear, likelihood, rough), free, ROBUST, 0, True)
-    return Space(simulator, rough, fit, impulses(simulator, rough, fit) if simulator.movers() else _no_impulses(fit))
+    return respond(simulator, rough, fit)
 
 
 def perfect(simulator: Simulator, inputs: Floats, rate_hz: float, sigma: float) -> Likelihood:
@@ -55,15 +54,6 @@ def perfect(simulator: Simulator, inputs: Floats, rate_hz: float, sigma: float) 
         prior_mean=simulator.defaults,
         prior_std=np.array([p.half_width for p in simulator.parameters]),
     )
-
-
-def _no_impulses(fit: Fit) -> Impulses:
-    """Where nothing slides or turns, nothing is pushed."""
-    episodes = len(fit.linear.residual)
-    size = fit.linear.residual[0].size
-    none = np.empty(0)
-    paths, response = np.empty((episodes, 0, 0, 4)), np.empty((episodes, size, 0))
-    return Impulses((), np.empty(0, bool), none, paths, none, none, none, response)
 
 
 def completed(cell: Cell, actions: Floats) -> Floats:

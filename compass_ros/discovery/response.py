@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit
+from compass_ros.calibration.least_squares import Fit, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.evidence import Tangent
 from compass_ros.discovery.settings import MOMENTS
@@ -43,11 +44,15 @@ class Response:
 
     @cached_property
     def inside(self) -> Ints:
-        """Which of the free parameters lie within their bounds: one that lies on a bound is held there, and a law whose
-        size is zero there adds nothing to the evidence."""
-        values, free = self.fit.point.values, self.fit.free
-        within = (values > self.likelihood.low) & (values < self.likelihood.high)
-        return np.flatnonzero(within[free])
+        """Which of the free parameters may move: one that lies on a bound and would leave it is held there, and a law
+        whose size is zero there adds nothing to the evidence."""
+        likelihood, fit = self.likelihood, self.fit
+        _, gradient = normal_equations(likelihood, fit.point, fit.linear, fit.free, fit.robust)
+        values, outward = fit.point.values[fit.free], gradient[: len(fit.free)]
+        held = ((values <= likelihood.low[fit.free]) & (outward > 0)) | (
+            (values >= likelihood.high[fit.free]) & (outward < 0)
+        )
+        return np.flatnonzero(~held)
 
     @cached_property
     def tangent(self) -> Tangent:
@@ -90,14 +95,30 @@ class Response:
 
     def accelerations(self, attached: Attached, numbers: Floats) -> Floats:
         """(E, K, S) of a law of forces with (q,) numbers, along the fitted motion; zero of signals."""
-        chosen = [next(n for n, s in enumerate(self.sites) if s.names[0] == name) for name in attached.objects]
-        states = np.ascontiguousarray(self.states[:, :, chosen])
-        forces = self.simulator.forces(attached, np.tile(numbers, (len(states), 1)), self.values, states)
-        out = np.zeros((*states.shape[:2], len(self.unit)))
-        for name, n in zip(attached.objects, chosen, strict=True):
-            own = np.flatnonzero(self.site_of == n)
-            out[:, :, own] = forces[name][..., : len(own)] / self.inertia[own]
+        out = np.zeros((*self.states.shape[:2], len(self.unit)))
+        out[:, :, self.pushed_by(attached)] = self.law(attached)(numbers)
         return out
+
+    def pushed_by(self, attached: Attached) -> Ints:
+        """(n,) directions in which a law of forces pushes."""
+        return np.concatenate([np.flatnonzero(self.site_of == n) for n in self._chosen(attached)])
+
+    def law(self, attached: Attached) -> Callable[[Floats], Floats]:
+        """A law of forces as a function of its (q,) numbers: (E, K, n) accelerations in the directions it pushes in."""
+        own = [np.flatnonzero(self.site_of == n) for n in self._chosen(attached)]
+        states = np.ascontiguousarray(self.states[:, :, self._chosen(attached)])
+        force = self.simulator.force_law(attached, self.values, states)
+
+        def accelerations(numbers: Floats) -> Floats:
+            of = force(np.tile(numbers, (len(states), 1)))
+            parts = [of[n][..., : len(i)] / self.inertia[i] for n, i in zip(attached.objects, own, strict=True)]
+            return np.concatenate(parts, axis=2)
+
+        return accelerations
+
+    def _chosen(self, attached: Attached) -> list[int]:
+        """Sites by the law's objects."""
+        return [next(n for n, s in enumerate(self.sites) if s.names[0] == name) for name in attached.objects]
 
     def changes(self, attached: Attached, numbers: Floats) -> Floats:
         """(E, D, n) changes of the residual by (n, q) numbers of one more law, from rollouts."""
@@ -123,7 +144,6 @@ def respond(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> Response:
     inertia = matrices[..., dofs, dofs].mean(axis=(0, 1))
     inverse = np.linalg.inv(matrices)[..., dofs] * inertia  # (E, K, V, S)
     spacing = float(np.diff(unit_kicks.moments_s).mean()) if len(unit_kicks.moments_s) > 1 else 1.0
-    moved = np.einsum("efckv,ekvs->efcks", unit_kicks.response, inverse) * spacing
     forced = np.einsum("efckv,ekvs->efcks", unit_kicks.response, inverse) * spacing
     read = readings(likelihood, unit_kicks.moments_s)
     seen = ~np.isnan(likelihood.measured)

@@ -16,14 +16,15 @@ import numpy as np
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.first_order import FirstOrder, Ranked
-from compass_ros.discovery.hypothesis import Hypothesis, finished, from_parent, further, race
-from compass_ros.discovery.joint import Joint
+from compass_ros.discovery.fits import finished, from_parent, further, race
+from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.settings import PRIOR_LAW, PRIOR_UNKNOWN, RHO, RHO_PRIOR
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
 
-RACED = 6
-"""Neighbours that are fitted; the better half of them again with exact differences. A budget."""
+RACED = 4
+"""Neighbours that are fitted from their parent: a budget. Those that a discrepancy could bring before the best, whether
+from there or from the race, are fitted again with exact differences."""
 SLIGHT = 0.01
 """Probability that is left to models that are not brought to their optimum: that of a false alarm."""
 STEPS = 4
@@ -103,12 +104,11 @@ def search(
     best, top, ranked = plain, 0.0, list(first)
     while True:
         tried = [from_parent(best, r, STEPS) for r in promising(ranked, best)[:RACED]]
-        tried.sort(key=lambda h: -h.log_evidence)
         take(tried)
-        within = [h for h in tried[: (len(tried) + 1) // 2] if h is tried[0] or h.free.log > tried[0].log_evidence]
-        take(further(h, STEPS) for h in within)
-        if not known or calls_for_more(max(known.values(), key=lambda one: one[1])[0], price):
+        if found.unknown > 0 and (not known or calls_for_more(max(known.values(), key=lambda one: one[1])[0], price)):
             take(race(best, cold_starts(ranked, best)))
+        to_beat = max((h.log_evidence for h, _ in known.values()), default=-np.inf)
+        take(further(h, STEPS) for h in tried if h.free.log > to_beat or h.log_evidence == to_beat)
         leader = max(known.values(), key=lambda one: one[1])
         tell("fit effects", min(0.3 + 0.2 * len(leader[0].laws), 0.9))
         if leader[1] <= top or not calls_for_more(leader[0], price):
@@ -117,30 +117,34 @@ def search(
         ranked = rank(FirstOrder(best.response), candidates)
         if top + max(r.gain + prior.of_laws([r.candidate.name]) for r in ranked) < found.unknown:
             break  # no law more could come up to a free discrepancy
-    finish(known, lambda h: h.log_evidence - none + prior.of_laws(a.effect.name for a in h.laws))
+    finish(known, lambda h: h.log_evidence - none + prior.of_laws(a.effect.name for a in h.laws), (0.0, found.unknown))
     ordered = sorted(known.values(), key=lambda one: -one[1])
     return Found(plain, found.unknown, tuple(h for h, _ in ordered), tuple(o for _, o in ordered), tuple(first))
 
 
-def finish(known: dict[str, tuple[Hypothesis, float]], odds_of: Callable[[Hypothesis], float]) -> None:
+def finish(
+    known: dict[str, tuple[Hypothesis, float]], odds_of: Callable[[Hypothesis], float], others: Sequence[float]
+) -> None:
     """Bring the models that hold all but SLIGHT of the probability to their optimum, in place.
 
     What a fit still lacks there, and rough differences, are worth some units of log evidence: as much as two laws may
     be apart. One with a law that is within its error bars of zero, as the noise leaves them or as the episodes disagree
-    on it (`Joint.distinct`), is the model without that law, and goes.
+    on it (`Hypothesis.distinct`), is the model without that law, and goes. `others`: log odds of models without a law.
     """
     done: set[str] = set()
     while True:
-        ordered = sorted(known.items(), key=lambda item: -item[1][1])
-        logs = np.array([odds for _, (_, odds) in ordered])
-        before = np.concatenate([[-np.inf], np.logaddexp.accumulate(logs)[:-1]]) - log_sum(logs) if len(logs) else logs
-        open_ = [name for (name, _), held in zip(ordered, before, strict=True) if np.exp(held) < 1 - SLIGHT]
-        name = next((one for one in open_ if one not in done), None)
+        total = log_sum(np.array([*others, *(odds for _, odds in known.values())]))
+        rest = -np.inf
+        name = None
+        for one, (_, odds) in sorted(known.items(), key=lambda item: item[1][1]):
+            rest = np.logaddexp(rest, odds)  # of this one and all less probable ones
+            if one not in done and rest - total > np.log(SLIGHT):
+                name = one
         if name is None:
             return
         done.add(name)
         model = finished(known[name][0])
-        if Joint(model.simulator, model.likelihood, model.fit, model.laws).distinct:
+        if model.distinct:
             known[name] = model, odds_of(model)
         else:
             del known[name]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,13 +12,16 @@ import numpy as np
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.discovery.finding import Discovery, Tried, held_out_error
+from compass_ros.discovery.floor import TWICE, shown_noise
 from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.maps import table_map
 from compass_ros.discovery.next_shot import next_experiment
 from compass_ros.discovery.search import Found
 from compass_ros.discovery.where import whereabouts
-from compass_ros.discovery.words import errors, place, value_of, where_of
+from compass_ros.discovery.words import DEPENDS, errors, place, value_of, where_of
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import rms_distance
+from compass_ros.simulation.sites import PLANAR
 from compass_ros.types import (
     EffectFinding,
     EffectParameter,
@@ -87,14 +90,20 @@ class Judge:
         return [self.found.models[i] for i in order[:count]]
 
     def _none(self) -> Discovery:
-        unit = f"m{self.simulator.unit}"
-        numbers = f"held-out error {1e3 * self._before:.2f} {unit}, noise {1e3 * self._floor:.2f} {unit}"
-        return self._said("none", f"Nothing is missing that these recordings could show: {numbers}.")
+        noise, unit = self.noise, f"m{self.simulator.unit}"
+        if self._before >= TWICE * self._floor:
+            noise = shown_noise(noise, self.found.plain.likelihood, self.found.plain.fit)
+        floor = rms_distance(self.simulator.cell, noise.rms[None, None])
+        numbers = f"held-out error {1e3 * self._before:.2f} {unit}, noise {1e3 * floor:.2f} {unit}"
+        return replace(
+            self._said("none", f"Nothing is missing that these recordings could show: {numbers}."), noise=noise
+        )
 
     def _unknown(self) -> Discovery:
         unit = f"m{self.simulator.unit}"
         where = whereabouts(self.found.plain.response, self.found.plain.free)
-        sentence = f"{place(where, flat=False)}, something differs that no known law explains"
+        sentence = f"{place(where, self._flat)}, something differs that no known law explains"
+        sentence += DEPENDS[where.depends_on]
         if self.found.models:
             _, unknown, of_models = self.found.probabilities
             best = self.found.models[0].name
@@ -120,7 +129,7 @@ class Judge:
             lacks = "one of these: " + "; ".join(dict.fromkeys(m.name for m in models))
         sizes = "; ".join(value_of(f, a) for f, a in zip(findings, best.laws, strict=True))
         said = errors(self._before, after, self._floor, self.simulator.unit)
-        sentence = f"{place(where, flat=False)}, the simulator lacks {lacks}; {sizes}; {said}."
+        sentence = f"{place(where, self._flat)}, the simulator lacks {lacks}; {sizes}; {said}."
         return self._said(verdict, sentence, where, findings, following, best)
 
     def _said(
@@ -136,12 +145,14 @@ class Judge:
             verdict, where, findings, self.undetectable, following, sentence, self._explanations(), self.alpha
         )
         tried = self._tried(best, findings[0].evidence.held_out_gain if findings else math.nan)
-        warnings, cell = self.warnings, len(self.simulator.cell.parameters)
+        plain, cell = self.found.plain, len(self.simulator.cell.parameters)
+        before = table_map(plain.response, plain.free.pushes)
         if best is None:
-            return Discovery(mismatch, tried=tried, warnings=warnings)
+            return Discovery(mismatch, tried=tried, before=before, warnings=self.warnings)
         values, std = best.fit.point.values, best.std
+        after = table_map(best.response, best.free.pushes)
         return Discovery(
-            mismatch, best.simulator, values, values[:cell], std[:cell], std, tried=tried, warnings=warnings
+            mismatch, best.simulator, values, values[:cell], std[:cell], std, tried, before, after, self.warnings
         )
 
     def _explanations(self) -> tuple[Explanation, ...]:
@@ -183,6 +194,11 @@ class Judge:
         """Held-out error of the simulator without laws."""
         plain = self.found.plain
         return held_out_error(self.simulator.cell, plain.likelihood.on(self.held_out), plain.fit.point.values)
+
+    @property
+    def _flat(self) -> bool:
+        """Whether something that is tracked slides in a plane."""
+        return any(site.kind in PLANAR for site in self.simulator.moving.values())
 
     @property
     def _floor(self) -> float:

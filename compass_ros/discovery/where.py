@@ -1,4 +1,4 @@
-"""Where a discrepancy sits: on which joint, or in a signal."""
+"""Where a discrepancy sits, and on what it depends: a joint or body, a part of the plane or of a range, or a signal."""
 
 from __future__ import annotations
 
@@ -6,15 +6,42 @@ import numpy as np
 
 from compass_ros.discovery.discrepancy import Free, spread
 from compass_ros.discovery.evidence import evidences, log_sum
+from compass_ros.discovery.kernels import Shared, shared
+from compass_ros.discovery.maps import in_plane
 from compass_ros.discovery.response import Response
 from compass_ros.discovery.settings import FREE
-from compass_ros.types import Where
+from compass_ros.simulation.sites import JOINTS
+from compass_ros.types import DependsOn, Floats, Interval, Region, Where
+
+HELD, WIDE = 0.9, 0.6
+"""Share of a discrepancy's square that a range holds to be told as its place; share of all moments that it may hold at
+most, beyond which it is no place."""
+CLEARLY = 3.0
+"""Difference of log evidence from which one thing is said and not the other: odds of 20 (Kass and Raftery 1995,
+'strong')."""
 
 
 def whereabouts(response: Response, free: Free) -> Where:
-    """Site and channel of a free discrepancy: the one site whose discrepancy has the highest evidence, or all."""
+    """Site, channel, place and kind of a free discrepancy."""
     if not free.of_forces:
         return Where("all", "all", "sensing")
+    n = _site(response)
+    name = response.sites[n].name if n is not None and len(response.sites) > 1 else "all"
+    best = max((shared(response, "place"), shared(response, "velocity")), key=lambda one: one.log)
+    depends_on = _depends_on(best, response, free)
+    pushes = free.pushes if depends_on == "time" else best.pushes
+    return Where(
+        name,
+        "free",
+        "dynamics",
+        region(response, pushes) if depends_on != "velocity" else None,
+        interval=interval(response, pushes, n, depends_on),
+        depends_on=depends_on,
+    )
+
+
+def _site(response: Response) -> int | None:
+    """The one whose discrepancy alone has the highest evidence; None: that of all has."""
     count = len(response.site_of)
     logs = []
     for chosen in (None, *range(len(response.sites))):
@@ -23,5 +50,50 @@ def whereabouts(response: Response, free: Free) -> Where:
         found = evidences(response.tangent, [spread(response, s * on * response.unit) for s in FREE])
         logs.append(log_sum(np.array([f.log for f in found])))
     best = int(np.argmax(logs)) - 1
-    name = response.sites[best].name if best >= 0 and len(response.sites) > 1 else "all"
-    return Where(name, "free", "dynamics")
+    return best if best >= 0 else None
+
+
+def _depends_on(best: Shared, response: Response, free: Free) -> DependsOn | None:
+    """Place or velocity where a function of it has clearly more evidence than of the other, or than one of time."""
+    other = shared(response, "velocity" if best.kernel == "place" else "place")
+    if free.log > best.log + CLEARLY:
+        return "time"
+    return best.kernel if best.log > max(other.log, free.log) + CLEARLY else None
+
+
+def region(response: Response, pushes: Floats) -> Region | None:
+    """A disc in the plane that holds most of (E, K, S) pushes, where it is clearly smaller than where things were."""
+    place, size = in_plane(response, pushes)
+    strength = size**2
+    if not strength.sum() > 0:
+        return None
+    centre = (strength[:, None] * place).sum(axis=0) / strength.sum()
+    far = np.hypot(*(place - centre).T)
+    order = np.argsort(far)
+    inside = np.searchsorted(np.cumsum(strength[order]), HELD * strength.sum())
+    radius = float(far[order][min(inside, len(far) - 1)])
+    wide = float(np.mean(far <= radius))
+    return Region((float(centre[0]), float(centre[1])), radius) if wide < WIDE else None
+
+
+def interval(response: Response, pushes: Floats, n: int | None, depends_on: DependsOn | None) -> Interval | None:
+    """The shortest range of an angle, or of a speed, that holds most of the pushes on one site; None: no such range."""
+    if n is None or depends_on not in ("place", "velocity"):
+        return None
+    states, joint = response.states[:, :, n].reshape(-1, 6), response.sites[n].kind in JOINTS
+    unit = response.simulator.unit if joint else "m"
+    if depends_on == "place" and not joint:
+        return None
+    at = states[:, 0] if depends_on == "place" else np.hypot(states[:, 2], states[:, 3] if not joint else 0.0)
+    strength = np.sum(pushes[:, :, np.flatnonzero(response.site_of == n)] ** 2, axis=2).ravel()
+    order = np.argsort(at)
+    held = np.concatenate([[0.0], np.cumsum(strength[order]) / max(strength.sum(), 1e-300)])
+    last = np.searchsorted(held, held[:-1] + HELD - 1e-9)
+    able = np.flatnonzero(last <= len(at))
+    first = int(able[np.argmin(at[order][last[able] - 1] - at[order][able])])
+    if last[first] - first > WIDE * len(at):
+        return None
+    low, high = float(at[order][first]), float(at[order][last[first] - 1])
+    if depends_on == "velocity":
+        return Interval("speed", low, high, f"{unit}/s")
+    return Interval("angle" if unit == "rad" else "position", low, high, unit)

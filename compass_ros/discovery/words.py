@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from compass_ros.discovery.joint import ERROR_BARS
+from compass_ros.discovery.hypothesis import ERROR_BARS
 from compass_ros.simulation.effects import Attached
-from compass_ros.types import Channel, EffectFinding, Floats, Phase, Region, Unit, Where
+from compass_ros.types import Channel, DependsOn, EffectFinding, Floats, Phase, Region, Unit, Where
 
 PHASE: dict[str, Phase] = {
     "rate_dependent_restitution": "all",
@@ -55,7 +55,19 @@ def place(where: Where, flat: bool = True) -> str:
     if where.region:
         x, y = where.region.centre_m
         words += f", within {100 * where.region.radius_m:.0f} cm of ({x:.2f}, {y:.2f})"
+    if where.interval:
+        one = where.interval
+        words += f", at {one.quantity}s of {one.low:.2g} to {one.high:.2g} {one.unit}"
     return words
+
+
+DEPENDS: dict[DependsOn | None, str] = {
+    None: "",
+    "place": ", and depends on place",
+    "velocity": ", and depends on velocity",
+    "time": ", and depends neither on place nor on velocity alone",
+}
+"""What a difference that no law explains is a function of."""
 
 
 def value_of(finding: EffectFinding, attached: Attached) -> str:

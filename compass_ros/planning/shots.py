@@ -10,11 +10,12 @@ import numpy as np
 from compass_ros.cells import Cell
 from compass_ros.config import read_yaml
 from compass_ros.discovery.candidates import candidates
-from compass_ros.discovery.exchange import choose
-from compass_ros.discovery.information import information
-from compass_ros.discovery.plan import Plan, objections, plan_of, widest
+from compass_ros.discovery.objections import objections
 from compass_ros.discovery.planned import completed, draw, linearised
 from compass_ros.errors import ConfigError, nearest, shown
+from compass_ros.planning.exchange import choose
+from compass_ros.planning.information import information
+from compass_ros.planning.plan import Plan, plan_of, widest
 from compass_ros.simulation import Simulator
 from compass_ros.types import Floats
 
@@ -49,8 +50,10 @@ def look(
     warnings = objections(cell, inputs, rate)
     count, fields = len(inputs), len(cell.action)
     pool = draw(simulator, tries * count, rng) if propose else inputs[:0]
-    space = linearised(simulator, np.concatenate([inputs, pool]), rate, cell.spec.noise_m)
-    known = information(space, candidates(simulator, *space.told))
+    response = linearised(simulator, np.concatenate([inputs, pool]), rate, cell.spec.noise_m)
+    likelihood = response.likelihood
+    asked = candidates(simulator, simulator.defaults, likelihood.inputs, likelihood.time_s)
+    known = information(response, asked)
     plan = plan_of(known.of_shots(np.arange(count)))
     if not propose:
         return Planned(actions, plan, warnings, None, None)

@@ -18,6 +18,7 @@ from compass_ros.types import (
     Explanation,
     Gap,
     Graph,
+    Interval,
     LeftOut,
     Mismatch,
     ParameterRow,
@@ -123,13 +124,15 @@ def _quantities(said: Json) -> dict[str, EffectParameter]:
 
 
 def _where(where: Json) -> Where:
-    region, time_s = where["region"], where["time_s"]
+    region, time_s, interval = where["region"], where["time_s"], where.get("interval")
     return Where(
         where["object"],
         where["phase"],
         where["channel"],
         None if region is None else Region((region["centre_m"][0], region["centre_m"][1]), region["radius_m"]),
         None if time_s is None else (time_s[0], time_s[1]),
+        None if interval is None else Interval(**interval),
+        where.get("depends_on"),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -94,6 +95,8 @@ def _where(where: Where | None) -> dict[str, Any] | None:
         if region is None
         else {"centre_m": [float(c) for c in region.centre_m], "radius_m": float(region.radius_m)},
         "time_s": None if where.time_s is None else [float(t) for t in where.time_s],
+        "interval": None if where.interval is None else asdict(where.interval),
+        "depends_on": where.depends_on,
     }
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from compass_ros.reporting.numbers import MINUS, with_unit
-from compass_ros.types import ParameterRow, Phase, Result, Told, Unit, Verdict, Where
+from compass_ros.types import DependsOn, ParameterRow, Phase, Result, Told, Unit, Verdict, Where
 
 Level = Literal["good", "note", "care", "bad"]
 Model = Literal["nominal", "calibrated", "with_effects"]
@@ -56,6 +56,12 @@ PHASE: Mapping[Phase, str] = {
     "wall_contact": "at wall contacts",
     "object_contact": "at contacts between objects",
     "all": "in every phase",
+}
+
+KIND: Mapping[DependsOn, str] = {
+    "place": "a function of place",
+    "velocity": "a function of velocity",
+    "time": "neither a function of place nor of velocity",
 }
 
 OF_JOINTS: Mapping[Phase, str] = {**PHASE, "strike": "in the drive", "free": "in motion"}
@@ -119,6 +125,11 @@ def where_rows(where: Where, unit: Unit) -> tuple[tuple[str, str], ...]:
         rows.append(
             ("region", f"within {where.region.radius_m * 100:.0f} cm of ({x:.3f}, {y:.3f}) m".replace("-", MINUS))
         )
+    if where.interval is not None:
+        one = where.interval
+        rows.append((one.quantity, f"{one.low:.3g} to {one.high:.3g} {one.unit}".replace("-", MINUS)))
+    if where.depends_on is not None:
+        rows.append(("kind", KIND[where.depends_on]))
     if where.time_s is not None:
         rows.append(("time", f"{where.time_s[0]:.2f} to {where.time_s[1]:.2f} s after the command"))
     return tuple(rows)

@@ -31,13 +31,14 @@ class Kicks:
 
 
 def kicks(simulator: Simulator, values: Floats, inputs: Floats, time_s: Floats, count: int) -> Kicks:
-    """For (P,) values, (E, A) inputs and (E, F) times [s], at so many moments, evenly over the recordings."""
+    """For (P,) values, (E, A) inputs and (E, F) times [s], at so many moments, in the middle of equal stretches."""
     episodes = len(inputs)
     tiled = np.tile(values, (episodes, 1))
     start, controls, steps = simulator.begun(tiled, inputs, simulator.physics.duration(tiled, inputs, time_s))
     states, sensors = simulator.play(tiled, start, controls, steps)
     states = np.concatenate([start[:, None], states], axis=1)
-    moments = np.unique(np.round(np.linspace(0, steps, count + 1)).astype(int))
+    middles = (np.arange(count) + 0.5) * steps / count  # of equal stretches: the sum of kicks is an integral's
+    moments = np.append(np.unique(middles.astype(int)), steps)
     chart = Chart.of(simulator.physics.model)
     sizes = changes(chart, states, moments, simulator.time_step)
     raw = _Raw(simulator, states.shape[2] - 1)
@@ -50,8 +51,8 @@ def kicks(simulator: Simulator, values: Floats, inputs: Floats, time_s: Floats, 
     for e in range(episodes):
         of_episode = ((rows[e], after[e]) for rows, after in stretches)
         rows = [moved for moved, _ in chained(of_episode, len(stretches), chart.nv, chart.size)]
-        begin = np.zeros((1, *rows[0].shape[1:]))
-        moved = np.concatenate([*([] if raw.sensed else [begin]), *rows])
+        begin = np.zeros((moments[0] + (not raw.sensed), *rows[0].shape[1:]))
+        moved = np.concatenate([begin, *rows])
         still = base[e] if raw.sensed else np.concatenate([raw.of(states[e, :1]), base[e]])
         response.append(_observed(simulator, values, inputs[e], time_s[e], still, moved))
     shape = (*time_s.shape, response[0].shape[-2], len(stretches), chart.nv)

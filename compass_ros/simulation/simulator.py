@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -215,15 +215,22 @@ class Simulator:
         (B, q) numbers, (P,) values of the cell, (B, F, N, 6) states x, y, vx, vy, mass, time of the effect's N objects.
         Of a joint: (angle, 0, rate, 0, anything, time), and its torque in the first place.
         """
-        context = self.physics.context(attached.sites(self.places), np.tile(values, (len(numbers), 1)))
-        terms = attached.effect.forces(numbers, context) if attached.effect.forces else ()
-        gravity = -float(self.physics.model.opt.gravity[2])
-        out = {name: np.zeros((*states.shape[:2], 2)) for name in attached.objects}
-        for term in terms:
-            if term.site is not None:
-                name = term.site.name
-                out[name] += evaluate(term, states[:, :, attached.objects.index(name)], gravity)
-        return out
+        return self.force_law(attached, values, states)(numbers)
+
+    def force_law(self, attached: Attached, values: Floats, states: Floats) -> Callable[[Floats], dict[str, Floats]]:
+        """`forces` as a function of the numbers, for those who ask for many."""
+        context = self.physics.context(attached.sites(self.places), np.tile(values, (len(states), 1)))
+        gravity, forces = -float(self.physics.model.opt.gravity[2]), attached.effect.forces
+        own = {name: np.ascontiguousarray(states[:, :, n]) for n, name in enumerate(attached.objects)}
+
+        def at(numbers: Floats) -> dict[str, Floats]:
+            out = {name: np.zeros((*states.shape[:2], 2)) for name in own}
+            for term in forces(numbers, context) if forces else ():
+                if term.site is not None:
+                    out[term.site.name] += evaluate(term, own[term.site.name], gravity)
+            return out
+
+        return at
 
     def play(
         self, values: Floats, start: Floats, controls: Floats | None, steps: int

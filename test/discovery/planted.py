@@ -12,10 +12,9 @@ from compass_ros.calibration.least_squares import Fit, Point, linearise, start
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import ROBUST
 from compass_ros.discovery.candidates import Candidate, candidates
-from compass_ros.discovery.impulses import impulses
-from compass_ros.discovery.joint import Joint, widened
+from compass_ros.discovery.hypothesis import Hypothesis, widened
 from compass_ros.discovery.planned import perfect
-from compass_ros.discovery.screen import Space
+from compass_ros.discovery.response import Response, respond
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
 from test.simulation.table import cell, simulator
@@ -59,25 +58,25 @@ def recorded_with(
     return replace(clean, measured=measured + np.random.default_rng(seed).normal(0, SIGMA, measured.shape))
 
 
-def space_of(likelihood: Likelihood) -> Space:
+def response_of(likelihood: Likelihood) -> Response:
     """Tangents at the defaults, where the fit would have begun."""
     free = np.array([cell().index(name) for name in FREE])
     point = start(likelihood, simulator().defaults)
     fit = Fit(point, linearise(likelihood, point, free, np.full(len(free), 0.02)), free, 1e3 * ROBUST, 0, True)
-    return Space(simulator(), likelihood, fit, impulses(simulator(), likelihood, fit))
+    return respond(simulator(), likelihood, fit)
 
 
 @cache
-def planned_space() -> Space:
+def planned_response() -> Response:
     """Three perfect shots."""
-    return space_of(perfect(simulator(), CALM, RATE, SIGMA))
+    return response_of(perfect(simulator(), CALM, RATE, SIGMA))
 
 
-def joint(space: Space, effect: Attached, numbers: Sequence[float]) -> Joint:
+def model(response: Response, effect: Attached, numbers: Sequence[float]) -> Hypothesis:
     """A fit that ended at the defaults with the given effect."""
-    wider, likelihood = widened(simulator(), space.likelihood, [effect])
+    wider, likelihood = widened(simulator(), response.likelihood, [effect])
     known = len(simulator().defaults)
-    free = np.concatenate([space.fit.free, known + np.arange(len(numbers))])
-    point = Point(np.concatenate([simulator().defaults, numbers]), space.fit.point.launch, 0.0)
+    free = np.concatenate([response.fit.free, known + np.arange(len(numbers))])
+    point = Point(np.concatenate([simulator().defaults, numbers]), response.fit.point.launch, 0.0)
     linear = linearise(likelihood, point, free, np.full(len(free), 0.02))
-    return Joint(wider, likelihood, Fit(point, linear, free, ROBUST, 0, True), (effect,))
+    return Hypothesis((effect,), wider, likelihood, Fit(point, linear, free, ROBUST, 0, True))

@@ -5,29 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compass_ros.discovery.joint import Joint
+from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.next_shot import NextExperiment, next_experiment
 from compass_ros.simulation.effects import EFFECTS, Attached
-from test.discovery.planted import PUCKS, joint, planned_space
+from test.discovery.planted import PUCKS, model, planned_response
 from test.simulation.table import cell, simulator
 
 
-def model(name: str, *numbers: float) -> Joint:
+def rival(name: str, *numbers: float) -> Hypothesis:
     objects = PUCKS if EFFECTS[name].moves else ()
-    return joint(planned_space(), Attached(EFFECTS[name], objects), numbers)
+    return model(planned_response(), Attached(EFFECTS[name], objects), numbers)
 
 
-def ask(*rivals: Joint) -> NextExperiment:
-    return next_experiment(simulator(), planned_space().likelihood, rivals, seed=0, pool=8)
-
-
-@pytest.fixture(scope="module")
-def forces() -> tuple[Joint, Joint]:
-    return model("viscous_drag", 0.2), model("magnus", 0.2)
+def ask(*rivals: Hypothesis) -> NextExperiment:
+    return next_experiment(simulator(), planned_response().likelihood, rivals, seed=0, pool=8)
 
 
 @pytest.fixture(scope="module")
-def found(forces: tuple[Joint, Joint]) -> NextExperiment:
+def forces() -> tuple[Hypothesis, Hypothesis]:
+    return rival("viscous_drag", 0.2), rival("magnus", 0.2)
+
+
+@pytest.fixture(scope="module")
+def found(forces: tuple[Hypothesis, Hypothesis]) -> NextExperiment:
     return ask(*forces)
 
 
@@ -45,7 +45,7 @@ def test_it_is_a_shot_within_reach_said_in_words(found: NextExperiment) -> None:
         assert word in found.sentence
 
 
-def test_the_models_differ_in_that_shot(forces: tuple[Joint, Joint], found: NextExperiment) -> None:
+def test_the_models_differ_in_that_shot(forces: tuple[Hypothesis, Hypothesis], found: NextExperiment) -> None:
     """The whole difference, in sigma of one millimetre, is at least what remains after the models adapt."""
     assert found.action is not None
     shot, time = np.array([[*found.action.values()]]), np.linspace(0, 2.5, 60)[None]
@@ -54,24 +54,24 @@ def test_the_models_differ_in_that_shot(forces: tuple[Joint, Joint], found: Next
     assert np.linalg.norm((one - other) / 1e-3) >= found.apart
 
 
-def test_the_same_seed_gives_the_same_shot(forces: tuple[Joint, Joint], found: NextExperiment) -> None:
+def test_the_same_seed_gives_the_same_shot(forces: tuple[Hypothesis, Hypothesis], found: NextExperiment) -> None:
     assert ask(*forces) == found
 
 
 def test_where_no_shot_helps_another_experiment_is_named() -> None:
     """A late camera and a late arm shift the pucks alike in every shot."""
-    found = ask(model("camera_latency", 0.01), model("actuation_delay", 0.01))
+    found = ask(rival("camera_latency", 0.01), rival("actuation_delay", 0.01))
     assert found.action is None
     assert "No shot tells camera_latency from actuation_delay" in found.sentence
     assert "encoders" in found.sentence
 
 
-def test_of_three_models_the_pair_that_stays_is_named(forces: tuple[Joint, Joint]) -> None:
-    found = ask(forces[0], model("camera_latency", 0.01), model("actuation_delay", 0.01))
+def test_of_three_models_the_pair_that_stays_is_named(forces: tuple[Hypothesis, Hypothesis]) -> None:
+    found = ask(forces[0], rival("camera_latency", 0.01), rival("actuation_delay", 0.01))
     assert found.action is not None
-    assert "viscous_drag from camera_latency" in found.sentence
+    assert "viscous_drag(puck1, puck2) from camera_latency" in found.sentence
     assert "No shot tells camera_latency from actuation_delay" in found.sentence
 
 
-def test_one_model_needs_no_experiment(forces: tuple[Joint, Joint]) -> None:
+def test_one_model_needs_no_experiment(forces: tuple[Hypothesis, Hypothesis]) -> None:
     assert ask(forces[0]) == NextExperiment("", None, 0.0)

@@ -35,11 +35,11 @@ def test_a_pusher_on_a_puck_and_one_that_misses_are_left_out() -> None:
 
 
 def test_perfect_recordings_leave_no_residual() -> None:
-    space = linearised(simulator(), CALM[:1], 30.0, 1e-3)
-    assert not space.residual.any()
-    assert (space.likelihood.sigma >= 1e-3).all()
-    assert space.parameters.shape[1] == len(cell().parameters)
-    assert (np.linalg.norm(space.parameters, axis=0) > 0).sum() > 35
+    response = linearised(simulator(), CALM[:1], 30.0, 1e-3)
+    assert not response.tangent.residual.any()
+    assert (response.likelihood.sigma >= 1e-3).all()
+    assert response.tangent.parameters.shape[2] == len(cell().parameters)
+    assert (np.linalg.norm(response.tangent.parameters, axis=(0, 1)) > 0).sum() > 35
 
 
 def test_a_cell_without_commands_has_no_shots_to_plan() -> None:

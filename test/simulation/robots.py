@@ -11,9 +11,8 @@ import numpy as np
 from compass_ros.calibration.least_squares import Fit, linearise, start
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.cells import Cell
-from compass_ros.discovery.impulses import impulses
 from compass_ros.discovery.planned import perfect
-from compass_ros.discovery.screen import Space
+from compass_ros.discovery.response import Response, respond
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
@@ -101,8 +100,8 @@ def noisy(likelihood: Likelihood, noise: Floats) -> Likelihood:
     return replace(likelihood, measured=likelihood.measured + noise)
 
 
-def space_of(simulator: Simulator, likelihood: Likelihood) -> Space:
+def response_of(simulator: Simulator, likelihood: Likelihood) -> Response:
     """Tangents at the defaults; no parameter is free to take anything."""
     point, free = start(likelihood, simulator.defaults), np.empty(0, np.int64)
     fit = Fit(point, linearise(likelihood, point, free, np.empty(0)), free, 1e6, 0, True)
-    return Space(simulator, likelihood, fit, impulses(simulator, likelihood, fit))
+    return respond(simulator, likelihood, fit)

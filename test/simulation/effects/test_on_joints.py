@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from compass_ros.discovery.candidates import candidates
-from compass_ros.discovery.tangents import score
+from compass_ros.discovery.first_order import FirstOrder
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, Exported, FittedEffect, attach, effect, read_effects, write_effects
 from compass_ros.simulation.sizes import JointSize, unit_joint
 from compass_ros.simulation.visited import Visited
 from compass_ros.types import Floats
-from test.simulation.robots import recorded, robot, shots, space_of
+from test.simulation.robots import recorded, response_of, robot, shots
 
 LAWS = ("coulomb_friction", "viscous_drag", "quadratic_drag", "stribeck_friction", "spring")
 UNITS = [(1.0, 1.0), (1024.0, 1.0), (1 / 1024, 1.0), (1.0, 1024.0), (1 / 4096, 1 / 64)]
@@ -32,7 +32,8 @@ def first_order(folder: Path, kind: str, law: str, force: float, length: float, 
     simulator, inputs = Simulator(cell, threads=1), shots(cell, 4, length=length if kind == "slide" else 1.0)
     (asked,) = [c for c in candidates(simulator, *told(simulator, inputs)) if c.name == law]
     planted = [0.3 * q.scale if q.amplitude else q.start for q in asked.attached.effect.quantities]
-    found = score(space_of(simulator, recorded(simulator, [asked.attached], planted, inputs)), asked)
+    response = response_of(simulator, recorded(simulator, [asked.attached], planted, inputs))
+    found = FirstOrder(response).ranked(asked)[0]
     return float(found.numbers[0] / planted[0]), found.gain
 
 

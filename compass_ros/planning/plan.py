@@ -6,15 +6,12 @@ The same table, for the shots that were recorded, says what a verdict cannot spe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from compass_ros.cells import Cell
 from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.information import Information, information
-from compass_ros.discovery.screen import Space
-from compass_ros.errors import DataError
+from compass_ros.planning.information import Information
 from compass_ros.types import Floats
 
 SIGMAS = 5.0
@@ -22,10 +19,6 @@ TWIN = 0.97
 """Cosine of projected tangents from which two effects cannot be told apart."""
 ABSORBED = 0.999
 """Share that parameters take from which nothing can be said of an effect."""
-REFUSED_HZ, SLOW_HZ = 25.0, 30.0
-REFUSED_SHOTS, FEW_SHOTS = 3, 8
-SAME, ALIKE = 0.01, 0.05
-"""Distance of two commands, in parts of what the robot can do: the same shot again; hardly another one."""
 
 
 @dataclass(frozen=True)
@@ -85,11 +78,6 @@ class Plan:
         return tuple(dict.fromkeys(v.name for v in self.effects if v.name not in seen))
 
 
-def visibility(space: Space, candidates: Sequence[Candidate]) -> tuple[Visible, ...]:
-    """What the shots of a fit could show of each candidate."""
-    return plan_of(information(space, candidates)).effects
-
-
 def plan_of(known: Information) -> Plan:
     """The table of all shots of an `Information`."""
     left, whole = known.of_effects()
@@ -136,15 +124,6 @@ def label(candidate: Candidate, candidates: Sequence[Candidate]) -> str:
     return f"{candidate.name} of {'+'.join(candidate.attached.objects)}"
 
 
-def knowing_twins(candidates: Sequence[Candidate], plan: Plan) -> tuple[Candidate, ...]:
-    """The candidates of a plan, each with those that the shots can hardly tell from it."""
-    labelled = {label(c, candidates): c.attached for c in candidates}
-    return tuple(
-        replace(c, twins=tuple(labelled[twin] for twin in seen.twins))
-        for c, seen in zip(candidates, plan.effects, strict=True)
-    )
-
-
 def _with_twins(known: Information, effects: Sequence[Visible], left: Floats) -> tuple[Visible, ...]:
     alike = cosines(known, left)
     labels = [label(c, known.candidates) for c in known.candidates]
@@ -181,40 +160,3 @@ def cosines(known: Information, left: Floats) -> Floats:
         cases = [best_block[columns].max(axis=0) for (candidate, _), columns in blocks.items() if candidate == i]
         out[i] = np.sqrt(np.clip(np.median(cases, axis=0), 0, 1))
     return np.asarray(np.maximum(out, out.T))
-
-
-def objections(cell: Cell, inputs: Floats, rate_hz: float) -> tuple[str, ...]:
-    """What speaks against (E, A) shots recorded at a rate, as warnings. Raises DataError where they cannot answer."""
-    if rate_hz < REFUSED_HZ:
-        raise DataError(
-            f"{rate_hz:.3g} frames a second are too slow: contacts last less than a frame, and parameters come out "
-            f"40-56 % wrong at 15; expected {REFUSED_HZ:g} or more"
-        )
-    out = []
-    if rate_hz < SLOW_HZ:
-        out.append(f"{rate_hz:.3g} frames a second are few; {SLOW_HZ:g} or more show contacts")
-    shots = "shots" if cell.action else "episodes"
-    if len(inputs) < REFUSED_SHOTS:
-        raise DataError(f"{len(inputs)} {shots} are too few: expected {REFUSED_SHOTS} or more, better {FEW_SHOTS}")
-    if len(inputs) < FEW_SHOTS:
-        out.append(
-            f"{len(inputs)} {shots} are few: with less than {FEW_SHOTS} hardly any is left to check a verdict on"
-        )
-    out.extend(_alike(cell, inputs))
-    return tuple(out)
-
-
-def _alike(cell: Cell, inputs: Floats) -> list[str]:
-    fields = len(cell.action)
-    if not fields:
-        return []
-    span = np.diff(cell.reach, axis=1)[:, 0]
-    apart = np.abs(inputs[:, None, :fields] - inputs[None, :, :fields]) / span
-    far = apart.max(axis=2) + np.diag(np.full(len(inputs), np.inf))
-    if np.all(apart.max(axis=2) < SAME):
-        raise DataError("all shots are the same: nothing tells what depends on speed, place or direction")
-    twice = int(np.sum(far.min(axis=1) < ALIKE))
-    if 2 * twice > len(inputs):
-        return [f"{twice} of {len(inputs)} shots have another one that differs by less than {ALIKE:.0%} of the reach"]
-    narrow = [a.name for a, wide in zip(cell.action, apart.max(axis=(0, 1)) < ALIKE, strict=True) if wide]
-    return [f"the shots are alike in {', '.join(narrow)}: what depends on it stays unseen"] if narrow else []

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compass_ros.discovery.information import Information
+from compass_ros.planning.information import Information
 from compass_ros.types import Floats, Ints
 
 PASSES = 3

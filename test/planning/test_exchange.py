@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 
 from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.exchange import choose, worth
-from compass_ros.discovery.information import Column, Information
+from compass_ros.planning.exchange import choose, worth
+from compass_ros.planning.information import Column, Information
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.types import Floats
 

@@ -13,14 +13,18 @@ from itertools import product
 import numpy as np
 
 from compass_ros.calibration.identifiability import information as information_of
+from compass_ros.calibration.least_squares import robust_weight
 from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.screen import Space
-from compass_ros.discovery.tangents import differences
+from compass_ros.discovery.response import Response
 from compass_ros.simulation.effects import Quantity
 from compass_ros.types import Floats, Ints, Parameter
 
 PLACES = (-0.5, 0.5)
 """Where a local field is tried beside its usual place, in parts of the way to the bounds."""
+FELT = 5.0
+"""Movement of all recordings together [sigma] from which a step says what an effect does."""
+STRETCH, LONGER = 4.0, 2
+"""By how much a step is lengthened that is not felt, and how often."""
 _LEAST = 1e-9
 """Share of a tangent that is called left over at least: rounding hides less."""
 
@@ -86,30 +90,31 @@ class Information:
         return replace(self, candidates=candidates, columns=columns, gram=self.gram[:, rows[:, None], rows])
 
 
-def information(space: Space, candidates: Sequence[Candidate]) -> Information:
+def information(response: Response, candidates: Sequence[Candidate]) -> Information:
     """Tangents of all candidates around a fit; effects that are no force cost one rollout a quantity and shot."""
     columns: list[Column] = []
-    tangents: list[Floats] = []
+    tangents: list[Floats] = [response.tangent.parameters]
     for i, candidate in enumerate(candidates):
-        for case, (quantities, of_case) in enumerate(_cases(space, candidate)):
+        for case, (quantities, of_case) in enumerate(_cases(response, candidate)):
             columns.extend(Column(i, case, q) for q in quantities)
             tangents.append(of_case * np.array([q.scale for q in quantities]))
-    free = space.fit.free
+    weight = np.sqrt(robust_weight(response.tangent.residual, response.tangent.robust))[:, :, None]
+    free, likelihood = response.fit.free[response.inside], response.likelihood
     return Information(
         candidates=tuple(candidates),
         columns=tuple(columns),
-        parameters=tuple(space.likelihood.parameters[i] for i in free),
-        width=space.likelihood.prior_std[free],
-        gram=_grams(space, np.concatenate([np.empty((space.residual.size, 0)), *tangents], axis=1)),
-        correlation_time=space.likelihood.correlation_time,
+        parameters=tuple(likelihood.parameters[i] for i in free),
+        width=likelihood.prior_std[free],
+        gram=information_of(np.concatenate(tangents, axis=2) * weight, response.tangent.own * weight),
+        correlation_time=likelihood.correlation_time,
     )
 
 
-def _cases(space: Space, candidate: Candidate) -> Iterator[tuple[list[Quantity], Floats]]:
-    """Amplitudes of each case with their (D, n) tangents per unit."""
+def _cases(response: Response, candidate: Candidate) -> Iterator[tuple[list[Quantity], Floats]]:
+    """Amplitudes of each case with their (E, D, n) tangents per unit."""
     quantities = candidate.attached.effect.quantities
     if not candidate.by_force:
-        yield [q for q in quantities if q.amplitude], differences(space, candidate)
+        yield [q for q in quantities if q.amplitude], _differences(response, candidate)
         return
     amplitudes = [i for i, q in enumerate(quantities) if q.amplitude]
     units = np.diag([q.scale for q in quantities])[amplitudes]
@@ -122,8 +127,35 @@ def _cases(space: Space, candidate: Candidate) -> Iterator[tuple[list[Quantity],
             for sign in (1.0, -1.0)
         ]
     for shapes in _shapes(quantities):
-        for direction, own in directions:
-            yield own, space.tangent_of_weights(space.weights(candidate, shapes, direction))
+        for sizes, own in directions:
+            pushed = [response.accelerations(candidate.attached, shapes + size) for size in sizes]
+            weights = np.stack([a.reshape(len(a), -1) for a in pushed], axis=2)
+            yield own, response.tangent.pushes @ (weights / [np.abs(size).max() for size in sizes])
+
+
+def _differences(response: Response, candidate: Candidate) -> Floats:
+    """(E, D, a) change of the residual per unit of each amplitude, from a step of its scale.
+
+    The step is longer where that is not felt: a limit or a dead band does nothing until it is reached.
+    """
+    quantities = [q for q in candidate.attached.effect.quantities if q.amplitude]
+    steps = np.array([q.scale for q in quantities])
+    change = response.changes(candidate.attached, _alone(candidate, steps))
+    for _ in range(LONGER):
+        unfelt = (np.linalg.norm(change, axis=(0, 1)) < FELT) & (steps * STRETCH < [q.high for q in quantities])
+        if not unfelt.any():
+            break
+        steps = np.where(unfelt, STRETCH * steps, steps)
+        change[:, :, unfelt] = response.changes(candidate.attached, _alone(candidate, steps)[unfelt])
+    return np.asarray(change / steps)
+
+
+def _alone(candidate: Candidate, steps: Floats) -> Floats:
+    """(a, q) settings: each of the amplitudes alone at its step, shapes as they begin."""
+    quantities = candidate.attached.effect.quantities
+    settings = np.tile([q.start for q in quantities], (len(steps), 1))
+    settings[:, [q.amplitude for q in quantities]] = np.diag(steps)
+    return settings
 
 
 def _shapes(quantities: Sequence[Quantity]) -> list[Floats]:
@@ -136,12 +168,3 @@ def _shapes(quantities: Sequence[Quantity]) -> list[Floats]:
         shapes[places] = [part * quantities[i].high for part, i in zip(parts, places, strict=True)]
         out.append(shapes)
     return out
-
-
-def _grams(space: Space, tangents: Floats) -> Floats:
-    """(E, p + n, p + n) products of the tangents of parameters and effects, shot by shot, with its launch taken out."""
-    episodes, size = space.weight.shape
-    weight = space.weight[:, :, None]
-    base = space.fit.linear.jacobian.reshape(episodes, size, -1) * weight
-    own = space.fit.linear.launch_jacobian.reshape(episodes, size, -1) * weight
-    return information_of(np.concatenate([base, tangents.reshape(episodes, size, -1)], axis=2), own)

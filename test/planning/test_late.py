@@ -14,12 +14,11 @@ from compass_ros.calibration.refine import ROBUST
 from compass_ros.cells import load
 from compass_ros.cells.drives import Drive
 from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.impulses import impulses
-from compass_ros.discovery.information import information
-from compass_ros.discovery.joint import widened
-from compass_ros.discovery.plan import cosines
+from compass_ros.discovery.hypothesis import widened
 from compass_ros.discovery.planned import perfect
-from compass_ros.discovery.screen import Space
+from compass_ros.discovery.response import respond
+from compass_ros.planning.information import information
+from compass_ros.planning.plan import cosines
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.types import Floats
@@ -87,8 +86,7 @@ def alike(name: str) -> float:
     free = np.array(of.index)
     point: Point = start(of.likelihood, of.simulator.defaults)
     fit = Fit(point, linearise(of.likelihood, point, free, np.full(len(free), 0.02)), free, 1e3 * ROBUST, 0, True)
-    space = Space(of.simulator, of.likelihood, fit, impulses(of.simulator, of.likelihood, fit))
-    known = information(space, [Candidate(attached(law)) for law in LATE])
+    known = information(respond(of.simulator, of.likelihood, fit), [Candidate(attached(law)) for law in LATE])
     return float(cosines(known, known.of_effects()[0])[0, 1])
 
 

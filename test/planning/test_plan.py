@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.information import Information, information
-from compass_ros.discovery.plan import Visible, knowing_twins, label, objections, plan_of, visibility
+from compass_ros.discovery.objections import objections
 from compass_ros.errors import DataError
+from compass_ros.planning.information import Information, information
+from compass_ros.planning.plan import Visible, label, plan_of
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.types import Floats
-from test.discovery.planted import CALM, PUCKS, planned_space
+from test.discovery.planted import CALM, PUCKS, planned_response
 from test.simulation.table import cell, simulator
 
 ASKED = (
@@ -28,7 +29,7 @@ ASKED = (
 
 @pytest.fixture(scope="module")
 def known() -> Information:
-    return information(planned_space(), ASKED)
+    return information(planned_response(), ASKED)
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +39,7 @@ def seen(known: Information) -> dict[str, Visible]:
 
 def left_over(attached: Attached, numbers: Floats) -> float:
     """Sigma that an effect moves all recordings by, after the free parameters have done their best."""
-    space = planned_space()
+    space = planned_response()
     wider = simulator().with_effects([attached])
     values = np.tile(np.concatenate([simulator().defaults, numbers]), (len(CALM), 1))
     given = space.likelihood
@@ -71,12 +72,6 @@ def test_a_late_camera_and_a_late_arm_are_twins(seen: dict[str, Visible]) -> Non
     assert seen["viscous_drag"].twins == ()
 
 
-def test_candidates_are_given_their_twins(known: Information) -> None:
-    told = {c.name: {twin.effect.name for twin in c.twins} for c in knowing_twins(ASKED, plan_of(known))}
-    assert told["camera_latency"] == {"actuation_delay"}
-    assert told["viscous_drag"] == set()
-
-
 def test_a_limit_that_a_small_step_does_not_reach_is_seen(seen: dict[str, Visible]) -> None:
     assert seen["velocity_saturation"].detectable
 
@@ -98,16 +93,11 @@ def test_more_shots_show_no_less(known: Information) -> None:
 
 def test_parameters_are_seen_as_their_standard_errors_say(known: Information) -> None:
     """Information with the others' priors taken into account: 1 / variance - 1 in prior widths."""
-    space = planned_space()
-    jacobian = space.fit.linear.jacobian.reshape(space.residual.size, -1)
+    space = planned_response()
+    jacobian = space.fit.linear.jacobian.reshape(space.tangent.residual.size, -1)
     variance = np.diag(np.linalg.inv(jacobian.T @ jacobian + np.eye(jacobian.shape[1])))
     expected = 5 / np.sqrt(1 / variance - 1) * space.likelihood.prior_std[space.fit.free]
     np.testing.assert_allclose([p.at_five_sigma for p in plan_of(known).parameters], expected, rtol=1e-6)
-
-
-def test_the_table_of_recorded_shots_is_the_same() -> None:
-    (found,) = visibility(planned_space(), ASKED[5:6])
-    assert (found.name, found.objects) == ("camera_scale", ())
 
 
 def test_labels_name_the_objects_where_they_are_some() -> None:
