@@ -55,7 +55,7 @@ class Use:
     load: tuple[float, float]
     """Lightest and heaviest payload [kg]."""
     share: float = 1.0
-    """Factor on sizes of torques and tilts: what swings by itself shows less of them."""
+    """Factor on sizes of torques and tilts: what swings by itself shows small ones, stiff servos only large ones."""
 
     def sizes(self, rng: Generator, low: float, high: float, count: int | None = None) -> Floats:
         """Uniform in the logarithm between shares of these."""
@@ -198,8 +198,9 @@ def sagging(use: Use, rng: Generator) -> Law:
 
 
 def margin(use: Use, rng: Generator) -> Law:
-    at, _, n = _at(use, rng)
-    return ComplianceMargin(at, use.noise * log_uniform(rng, 1.5, 15, n))
+    at, own, n = _at(use, rng)
+    error = use.carried[own] / use.arm.stiffness[own]  # as large as it is in use: a smaller margin is never entered
+    return ComplianceMargin(at, error * log_uniform(rng, 0.1, 1.5, n))
 
 
 def command_play(use: Use, rng: Generator) -> Law:

@@ -40,6 +40,7 @@ SETUP = Setup(
     sensors=Sensors(noise=0.0002, step=0.0003),
     tool=(0.0, 0.0, -0.12),
     load=(0.1, 1.0),
+    share=2.0,
 )  # fmt: skip
 WITH_EFFORT = replace(
     SETUP, name=EFFORT, motion=_interpolated, sensors=Sensors(noise=0.0002, step=0.0003, effort_noise=0.3)
