@@ -13,6 +13,7 @@ MODULES: Mapping[str, str] = {
     "kinova3": "arms.kinova",
     "kinova3_effort": "arms.kinova",
     "ball_flight": "flight.scene",
+    "ball_flight_air": "flight.scene",
     "bouncing_ball": "bounce.scene",
     "pushed_bar": "push.scene",
 }

@@ -13,7 +13,7 @@ from compass_ros.worlds.flight.ball import Ball, Throw, fly
 from compass_ros.worlds.world import Asked, World
 from test.worlds.task import simulated, task_of
 
-CELL, TASK = task_of("ball_flight")
+TASK = task_of("ball_flight")[1]
 BALL = Ball(0.43, 0.11, -9.81, np.zeros(3))
 
 
@@ -30,16 +30,17 @@ def first_state(one: Throw, ball: Ball) -> Floats:
     return np.concatenate([one.position_m - arm, quaternion, velocity, spin, np.zeros(3)])
 
 
-def test_without_laws_the_flight_is_the_simulators_at_the_true_parameters() -> None:
-    rng = np.random.default_rng(3)
-    values = draw.true_values(TASK.parameters, rng)
+@pytest.mark.parametrize("name", ["ball_flight", "ball_flight_air"])
+def test_without_laws_the_flight_is_the_simulators_at_the_true_parameters(name: str) -> None:
+    rng, (cell, task) = np.random.default_rng(3), task_of(name)
+    values = draw.true_values(task.parameters, rng)
     ball, throws = scene.ball_of(values), [scene.thrown(rng, 20.0) for _ in range(6)]
     time_s = np.tile(np.arange(120) / 120.0, (6, 1))
-    seen = simulated(CELL, values, np.stack([first_state(one, ball) for one in throws]), time_s)
-    made = np.stack([fly(ball, one, 1.1).pose(time_s[0]) for one in throws])
+    seen = simulated(cell, values, np.stack([first_state(one, ball) for one in throws]), time_s)
+    made = np.stack([scene.played(ball, one, {}).pose(time_s[0]) for one in throws])
     made[:, :, 3:] *= np.sign(np.sum(made[:, :, 3:] * seen[:, :, 3:], axis=2, keepdims=True))
-    assert np.abs(made[:, :, :3] - seen[:, :, :3]).max() < 0.01 * scene.PLACE_M
-    assert np.abs(made[:, :, 3:] - seen[:, :, 3:]).max() < 0.02 * scene.ANGLE_RAD
+    assert np.abs(made[:, :, :3] - seen[:, :, :3]).max() < 0.2 * scene.PLACE_M
+    assert np.abs(made[:, :, 3:] - seen[:, :, 3:]).max() < 0.2 * scene.ANGLE_RAD
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,8 @@ class Ball:
     """Along z [m/s^2], negative."""
     centre_m: Floats
     """(3,) centre of mass against the tracked centre, in the ball's axes."""
+    known_drag: float = 0.0
+    """Drag coefficient that the cell has too, the same at every speed."""
 
     @property
     def area_m2(self) -> float:

@@ -51,6 +51,18 @@ def drag(rng: Generator, surfaces: Sequence[str] = tuple(SURFACES)) -> Drawn:
     return Drawn(classes, {"share": share}, f"{name}: {surface.source}", push)
 
 
+def crisis(rng: Generator) -> Drawn:
+    """A coefficient that falls with the speed, where the cell has a constant one: less force at speed, more below."""
+    name = str(rng.choice(["football", "smooth", "baseball"]))
+
+    def push(ball: Ball, throw: Throw, wind: pushes.Wind) -> Acceleration:
+        real = pushes.drag(ball, SURFACES[name].coefficient, wind)
+        known = pushes.drag(ball, pushes.constant(ball.known_drag), wind)
+        return lambda *state: np.asarray(real(*state) - known(*state))
+
+    return Drawn(("viscous_drag", "quadratic_drag", UNKNOWN), {}, f"{name}: {SURFACES[name].source}", push)
+
+
 def magnus(rng: Generator) -> Drawn:
     name, share = str(rng.choice(list(LIFTS))), float(rng.uniform(0.85, 1.15))
 
@@ -143,6 +155,7 @@ def camera_shake(rng: Generator) -> Drawn:
 
 DRAW: Mapping[str, Callable[[Generator], Drawn]] = {
     "drag": drag,
+    "crisis": crisis,
     "magnus": magnus,
     "wind": wind,
     "buoyancy": buoyancy,

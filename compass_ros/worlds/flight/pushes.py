@@ -36,6 +36,11 @@ def drag(ball: Ball, coefficient: Curve, wind: Wind = still, share: float = 1.0)
     return push
 
 
+def constant(coefficient: float) -> Curve:
+    """The same at every Reynolds number."""
+    return lambda reynolds: np.full_like(reynolds, coefficient)
+
+
 def lift(ball: Ball, coefficient: Curve, spin_rads: Floats, share: float = 1.0) -> Acceleration:
     """Magnus: along spin x velocity. Only the part of the spin across the velocity counts (Nathan 2008)."""
     factor = 0.5 * DENSITY * ball.area_m2 / ball.mass_kg * share

@@ -25,9 +25,16 @@ PLACE_M, ANGLE_RAD = 3e-3, 0.02
 LOST = 0.02
 SLOWEST_MS, FASTEST_MS = 3.0, 26.0
 """Of the fastest throw of a world: by hand to a free kick (Carre et al. 2002, Sports Eng. 5, 183)."""
-SINGLES = ("drag", "buoyancy", "clock_drift", "camera_scale", "camera_rotation", "lens")
-PAIRS = (("drag", "magnus"), ("drag", "wind"), ("drag", "magnus"), ("drag", "lens"), ("drag", "camera_rotation"))
-"""Without drag no ball is lifted or blown away."""
+SENSING = ("clock_drift", "camera_scale", "camera_rotation", "lens")
+SINGLES: Mapping[str, Sequence[str]] = {
+    "ball_flight": ("drag", "drag", "buoyancy", *SENSING),
+    "ball_flight_air": ("magnus", "magnus", "wind", "wind", "crisis", *SENSING),
+}
+PAIRS: Mapping[str, Sequence[tuple[str, str]]] = {
+    "ball_flight": (("drag", "magnus"), ("drag", "wind"), ("drag", "magnus"), ("drag", "lens")),
+    "ball_flight_air": (("magnus", "wind"), ("magnus", "lens"), ("wind", "camera_rotation"), ("crisis", "magnus")),
+}
+"""By cell. Without drag no ball is lifted or blown away."""
 OUTSIDE = ("knuckle", "gusts", "plume", "camera_shake")
 WITH_DRAG = ("knuckle", "gusts", "plume")
 _STREAMS = ("kind", "values", "laws", "throws", "noise")
@@ -36,7 +43,7 @@ _STREAMS = ("kind", "values", "laws", "throws", "noise")
 def conceal(task: Task, asked: Asked) -> World:
     """Draw and play a world of a ball in flight."""
     rng = draw.streams(asked.seed, task.name, _STREAMS)
-    kind, names = chosen(asked, rng["kind"])
+    kind, names = chosen(task.name, asked, rng["kind"])
     values = draw.true_values(task.parameters, rng["values"])
     ball = ball_of(values)
     found = {name: DRAW[name](rng["laws"]) for name in names}
@@ -57,21 +64,23 @@ def conceal(task: Task, asked: Asked) -> World:
     return World(task.name, tuple(episodes), said)
 
 
-def chosen(asked: Asked, rng: Generator) -> tuple[Kind, tuple[str, ...]]:
+def chosen(cell: str, asked: Asked, rng: Generator) -> tuple[Kind, tuple[str, ...]]:
     """How much is missing, and what."""
     kind, names = draw.laws(asked, [n for n in DRAW if n not in OUTSIDE], OUTSIDE, rng)
     if asked.names:
         return kind, names
     if kind == "one":
-        return kind, (str(rng.choice(SINGLES)),)
+        return kind, (str(rng.choice(SINGLES[cell])),)
     if kind == "two":
-        return kind, PAIRS[int(rng.integers(len(PAIRS)))]
-    return kind, ("drag", *names) if set(names) & set(WITH_DRAG) else names
+        return kind, PAIRS[cell][int(rng.integers(len(PAIRS[cell])))]
+    bare = cell == "ball_flight" and set(names) & set(WITH_DRAG)
+    return kind, ("drag", *names) if bare else names
 
 
 def ball_of(values: Mapping[str, float]) -> Ball:
-    centre = np.array([values[f"ball@dyna@centre_{axis}"] for axis in "xyz"])
-    return Ball(MASS_KG, RADIUS_M, values["env@dyna@gravity"], centre)
+    centre = np.array([values.get(f"ball@dyna@centre_{axis}", 0.0) for axis in "xyz"])
+    known = 2 * values.get("ball@dyna@drag", 0.0)  # MuJoCo's coefficient is of rho A v^2
+    return Ball(MASS_KG, RADIUS_M, values["env@dyna@gravity"], centre, known)
 
 
 def thrown(rng: Generator, fastest_ms: float) -> Throw:
@@ -93,7 +102,8 @@ def played(ball: Ball, throw: Throw, laws: Mapping[str, Drawn]) -> Flight:
 
     blowing = air if winds else pushes.still
     acting = tuple(law.push(ball, throw, blowing) for law in laws.values() if law.push is not None)
-    return fly(ball, throw, DURATION_S + 0.05, acting)
+    known = (pushes.drag(ball, pushes.constant(ball.known_drag), blowing),) if ball.known_drag else ()
+    return fly(ball, throw, DURATION_S + 0.05, (*known, *acting))
 
 
 def faults(laws: Mapping[str, Drawn]) -> tuple[optics.Optics, ...]:
