@@ -46,15 +46,15 @@ def conceal(
     from compass_ros.cells import load
     from compass_ros.concealed.world import Wishes
     from compass_ros.errors import ConfigError
-    from compass_ros.worlds.scenes import MODULES, TABLES
+    from compass_ros.worlds.scenes import TABLES
     from compass_ros.worlds.world import Asked
 
-    names, name = tuple(effect or ()), load(cell).name
-    if forms == "foreign" and name in TABLES:
+    names, loaded = tuple(effect or ()), load(cell)
+    if forms == "foreign" and loaded.name in TABLES:
         if (noise, rms) != ("white", None):
             raise ConfigError(f"{cell}: --noise and --rms are not of --forms foreign")
         path = write_world(cell, Asked(seed, kind, names), out, answers)
-    elif name in MODULES or forms == "foreign":
+    elif loaded.spec.dynamics != "air_hockey" or forms == "foreign":
         if (noise, rms, forms) != ("white", None, "other"):
             raise ConfigError(f"{cell}: --noise, --rms and --forms are of the cell air_hockey alone")
         path = write_world(cell, Asked(seed, kind, names), out, answers)

@@ -10,7 +10,7 @@ import pytest
 
 from compass_ros.calibration.noise import measure_noise
 from compass_ros.cells import Cell, load
-from compass_ros.commands.conceal import write_world
+from compass_ros.commands.conceal import conceal, write_world
 from compass_ros.concealed.seal import unseal
 from compass_ros.errors import ConfigError
 from compass_ros.operation.current import read
@@ -106,6 +106,13 @@ def test_two_laws_are_of_two_families() -> None:
 def test_an_unknown_law_is_one_line() -> None:
     with pytest.raises(ConfigError, match=r"unknown law 'lugre'; known: .*; did you mean 'lugre_friction'\?"):
         world("two_joint_arm", Asked(0, names=("lugre",)))
+
+
+def test_a_cell_without_a_scene_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="panda: has no concealed worlds; known: air_hockey, .*kinova3"):
+        conceal(seed=0, out=tmp_path / "out", cell="panda", answers=tmp_path / "answers")
+    with pytest.raises(ConfigError, match="are of the cell air_hockey alone"):
+        conceal(seed=0, out=tmp_path / "out", cell="kinova3", answers=tmp_path / "answers", noise="tracker")
 
 
 @pytest.mark.parametrize("name", ARMS)
