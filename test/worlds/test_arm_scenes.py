@@ -109,7 +109,7 @@ def test_an_unknown_law_is_one_line() -> None:
 
 
 def test_a_cell_without_a_scene_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="panda: has no concealed worlds; known: air_hockey, .*kinova3"):
+    with pytest.raises(ConfigError, match=r"panda: has no concealed worlds; known: air_hockey, .*kinova3"):
         conceal(seed=0, out=tmp_path / "out", cell="panda", answers=tmp_path / "answers")
     with pytest.raises(ConfigError, match="are of the cell air_hockey alone"):
         conceal(seed=0, out=tmp_path / "out", cell="kinova3", answers=tmp_path / "answers", noise="tracker")
