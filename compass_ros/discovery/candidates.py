@@ -25,8 +25,6 @@ class Candidate:
     """An effect on certain objects."""
 
     attached: Attached
-    twins: tuple[Attached, ...] = ()
-    """What the recordings can hardly tell from it, where that is known."""
 
     @property
     def name(self) -> str:
@@ -58,14 +56,7 @@ def candidates(simulator: Simulator, values: Floats, inputs: Floats, time_s: Flo
             out.extend(_on_drives(effect, simulator, visited))
         elif simulator.accepts(effect, ()):
             out.append(Attached(effect, ()))
-    return tuple(Candidate(attached) for attached in out if not attached.effect.scattered)
-
-
-def scattered(simulator: Simulator, values: Floats, inputs: Floats, time_s: Floats) -> tuple[Candidate, ...]:
-    """Effects that differ from episode to episode by chance: on all drives of a kind."""
-    of_chance = [effect for effect in EFFECTS.values() if effect.scattered]
-    visited = Visited(simulator, values, inputs, time_s)
-    return tuple(Candidate(a) for effect in of_chance for a in _on_drives(effect, simulator, visited))
+    return tuple(Candidate(attached) for attached in out)
 
 
 def _on_movers(effect: Effect, simulator: Simulator, joints: Mapping[str, JointSize]) -> Iterator[Attached]:

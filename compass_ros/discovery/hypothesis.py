@@ -18,6 +18,8 @@ from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
 
+SPREADS = (0.3, 1.0, 3.0, 10.0, 30.0)
+"""Spreads of a law of chance that are equally probable before, in its modest size."""
 ERROR_BARS = 2.0
 """Error bars from zero within which a law is not named: a 95 % interval that holds its absence."""
 
@@ -56,6 +58,8 @@ class Hypothesis:
         """
         response, squared = self.response, np.zeros(len(self.response.unit))
         for attached, own in self.own():
+            if attached.effect.scattered:
+                continue  # each episode has its own number of it: no form that could be wrong
             if attached.effect.forces is not None and attached.effect.moves:
                 pushed = response.accelerations(attached, self.fit.point.values[own])
                 squared += np.mean(pushed**2, axis=(0, 1))
@@ -95,7 +99,8 @@ class Hypothesis:
     @property
     def log_evidence(self) -> float:
         """With a discrepancy in proportion to its laws; without laws, with none."""
-        return self._with_law[0] if self.laws else self.free.alone
+        chance = sum(law.effect.scattered for law in self.laws)
+        return self._with_law[0] - chance * float(np.log(len(SPREADS))) if self.laws else self.free.alone
 
     @cached_property
     def std(self) -> Floats:
@@ -105,6 +110,9 @@ class Hypothesis:
         """
         std, free = self.likelihood.prior_std.copy(), self.fit.free
         std[free] *= np.sqrt(variances(self.likelihood, self.fit))
+        for attached, own in self.own():
+            if attached.effect.scattered:  # of so few deviations
+                std[own] = self.fit.point.values[own] / np.sqrt(2 * len(self.likelihood.inputs))
         return std
 
     def own(self) -> Iterator[tuple[Attached, slice]]:

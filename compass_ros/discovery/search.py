@@ -18,6 +18,7 @@ from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.fits import finished, from_parent, further, race
 from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.scatter import ranked_scatter, with_scatter
 from compass_ros.discovery.settings import PRIOR_LAW, PRIOR_UNKNOWN, RHO, RHO_PRIOR
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
@@ -78,7 +79,8 @@ Tell = Callable[[str, float], bool]
 
 def rank(first: FirstOrder, candidates: Sequence[Candidate]) -> list[Ranked]:
     """Laws at their best shape, the one that promises most first."""
-    found = [first.ranked(c)[:1] for c in candidates]
+    of_chance = [[ranked_scatter(first.response, c)] for c in candidates if c.attached.effect.scattered]
+    found = [*(first.ranked(c)[:1] for c in candidates if not c.attached.effect.scattered), *of_chance]
     return sorted((f for some in found for f in some), key=lambda f: -f.gain)
 
 
@@ -94,21 +96,28 @@ def search(
         return found
     known: dict[str, tuple[Hypothesis, float]] = {}
 
+    def odds_of(h: Hypothesis, log_evidence: float) -> float:
+        return log_evidence - none + prior.of_laws(a.effect.name for a in h.laws)
+
     def take(models: Iterable[Hypothesis]) -> None:
         for h in models:
-            odds = h.log_evidence - none + prior.of_laws(a.effect.name for a in h.laws)
+            odds = odds_of(h, h.log_evidence)
             if h.name not in known or odds > known[h.name][1]:
                 known[h.name] = (h, odds)
+
+    def promises(h: Hypothesis) -> bool:
+        """Whether a better fit could make it probable: a discrepancy beside it says how much is left."""
+        most = odds_of(h, max(h.log_evidence, h.free.log))
+        return most > max(float(np.log(SLIGHT)), *(odds for _, odds in known.values()))
 
     price = max(prior.of_laws([name]) for name in prior.sites)
     best, top, ranked = plain, 0.0, list(first)
     while True:
-        tried = [from_parent(best, r, STEPS) for r in promising(ranked, best)[:RACED]]
+        tried = [neighbour(best, r) for r in promising(ranked, best)[:RACED]]
         take(tried)
         if found.unknown > 0 and (not known or calls_for_more(max(known.values(), key=lambda one: one[1])[0], price)):
             take(race(best, cold_starts(ranked, best)))
-        to_beat = max((h.log_evidence for h, _ in known.values()), default=-np.inf)
-        take(further(h, STEPS) for h in tried if h.free.log > to_beat or h.log_evidence == to_beat)
+        take(further(h, STEPS) for h in tried if promises(h))
         leader = max(known.values(), key=lambda one: one[1])
         tell("fit effects", min(0.3 + 0.2 * len(leader[0].laws), 0.9))
         if leader[1] <= top or not calls_for_more(leader[0], price):
@@ -117,13 +126,20 @@ def search(
         ranked = rank(FirstOrder(best.response), candidates)
         if top + max(r.gain + prior.of_laws([r.candidate.name]) for r in ranked) < found.unknown:
             break  # no law more could come up to a free discrepancy
-    finish(known, lambda h: h.log_evidence - none + prior.of_laws(a.effect.name for a in h.laws), (0.0, found.unknown))
+    finish(known, odds_of, (0.0, found.unknown))
     ordered = sorted(known.values(), key=lambda one: -one[1])
     return Found(plain, found.unknown, tuple(h for h, _ in ordered), tuple(o for _, o in ordered), tuple(first))
 
 
+def neighbour(parent: Hypothesis, ranked: Ranked) -> Hypothesis:
+    """A model with one law more, fitted from its parent."""
+    if ranked.candidate.attached.effect.scattered:
+        return with_scatter(parent, ranked)
+    return from_parent(parent, ranked, STEPS)
+
+
 def finish(
-    known: dict[str, tuple[Hypothesis, float]], odds_of: Callable[[Hypothesis], float], others: Sequence[float]
+    known: dict[str, tuple[Hypothesis, float]], odds_of: Callable[[Hypothesis, float], float], others: Sequence[float]
 ) -> None:
     """Bring the models that hold all but SLIGHT of the probability to their optimum, in place.
 
@@ -145,7 +161,7 @@ def finish(
         done.add(name)
         model = finished(known[name][0])
         if model.distinct:
-            known[name] = model, odds_of(model)
+            known[name] = model, odds_of(model, model.log_evidence)
         else:
             del known[name]
 
@@ -174,7 +190,7 @@ def cold_starts(ranked: Sequence[Ranked], parent: Hypothesis) -> list[tuple[Atta
     has = {a.effect.name for a in parent.laws}
     best: dict[str, Ranked] = {}
     for r in ranked:
-        if r.candidate.name not in has:
+        if r.candidate.name not in has and not r.candidate.attached.effect.scattered:
             best.setdefault(r.candidate.name, r)
     return [(r.candidate.attached, modest(r)) for r in best.values()]
 
