@@ -32,8 +32,9 @@ class Candidate:
 
     @property
     def by_force(self) -> bool:
-        """Whether it pushes bodies along their way, so that impulse responses tell what it does."""
-        return self.attached.effect.forces is not None and self.attached.effect.moves
+        """Whether it pushes what moves along a path, so that impulse responses tell what it does."""
+        effect = self.attached.effect
+        return effect.forces is not None and effect.moves and effect.on != ("body",)
 
 
 def candidates(simulator: Simulator, values: Floats, inputs: Floats, time_s: Floats) -> tuple[Candidate, ...]:
@@ -50,6 +51,7 @@ def candidates(simulator: Simulator, values: Floats, inputs: Floats, time_s: Flo
             continue
         if effect.moves:
             out.extend(_on_movers(effect, simulator, joints))
+            out.extend(_in_space(effect, simulator, visited))
         elif effect.on_walls:
             out.extend(Attached(effect, (wall,)) for wall in simulator.places.walls)
         elif any(kind in DRIVES for kind in effect.on):
@@ -72,6 +74,15 @@ def _on_movers(effect: Effect, simulator: Simulator, joints: Mapping[str, JointS
             own = tuple(dict.fromkeys(site.kind for site in sites))
             mistaken = any(places.of(site.name, effect.on) != site for site in sites)  # for a joint of the same name
             yield Attached(effect.on_kinds(own) if mistaken else effect, names)
+
+
+def _in_space(effect: Effect, simulator: Simulator, visited: Visited) -> Iterator[Attached]:
+    """Each body that moves in space by itself."""
+    able = [site for site in simulator.in_space.values() if effect.takes(simulator.places.model, site)]
+    sizes = visited.paths_in_space(names_of(able))[0] if able and effect.on_body else {}
+    for site in able:
+        sized = effect.at(sizes[site.name]) if effect.on_body else effect.on_kinds(("body",))
+        yield Attached(sized, site.names)
 
 
 def _on_drives(effect: Effect, simulator: Simulator, visited: Visited) -> Iterator[Attached]:

@@ -82,6 +82,6 @@ def _lacking(simulator: Simulator, episodes: int) -> str:
     """Why nothing can be looked for; empty where it can."""
     if episodes < MIN_EPISODES:
         return f"{episodes} fitted episodes are too few, {MIN_EPISODES} are the least"
-    if not simulator.movers():
-        return "effects act on bodies that slide in the plane and on joints; none is tracked in this cell"
+    if not (simulator.moving or simulator.in_space):
+        return "laws act on joints and on bodies that move; none is tracked in this cell"
     return ""

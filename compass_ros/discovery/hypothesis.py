@@ -60,7 +60,7 @@ class Hypothesis:
         for attached, own in self.own():
             if attached.effect.scattered:
                 continue  # each episode has its own number of it: no form that could be wrong
-            if attached.effect.forces is not None and attached.effect.moves:
+            if response.follows(attached):
                 pushed = response.accelerations(attached, self.fit.point.values[own])
                 squared += np.mean(pushed**2, axis=(0, 1))
                 continue

@@ -17,7 +17,6 @@ import numpy as np
 from compass_ros.discovery.evidence import log_sum, widths
 from compass_ros.discovery.response import Response
 from compass_ros.discovery.settings import FREE
-from compass_ros.simulation.sites import JOINTS
 from compass_ros.types import Floats
 
 Kernel = Literal["place", "velocity"]
@@ -55,11 +54,10 @@ def shared(response: Response, kernel: Kernel) -> Shared:
 def _features(response: Response, kernel: Kernel) -> Floats:
     """(E, K, S, n) accelerations by each weight, of unit variance in the response's units."""
     rng = np.random.default_rng(0)
-    shape, count = response.states.shape[:2], len(response.site_of)
+    shape, count = response.kicks.states.shape[:2], len(response.site_of)
     out = np.zeros((*shape, len(response.unit), count * FEATURES))
     for s, n in enumerate(response.site_of):
-        first = 0 if kernel == "place" else 2
-        at = response.states[:, :, n, first : first + (1 if response.sites[n].kind in JOINTS else 2)]
+        at = response.along(int(n))[0 if kernel == "place" else 1]
         spread = np.maximum(at.reshape(-1, at.shape[2]).std(axis=0), 1e-300)
         normal = rng.standard_normal((at.shape[2], FEATURES))
         frequency = normal / np.sqrt(rng.chisquare(FREEDOM, FEATURES) / FREEDOM) / LENGTH

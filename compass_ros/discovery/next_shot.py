@@ -20,7 +20,7 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.planned import drawn
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
-from compass_ros.simulation.sites import JOINTS
+from compass_ros.simulation.sites import PLANAR
 from compass_ros.types import Floats
 
 POOL = 32
@@ -60,7 +60,7 @@ OF_JOINTS: Mapping[frozenset[str], str] = MappingProxyType(
         frozenset({"contact"}): "film one touch at several speeds with a fast camera",
     }
 )
-"""The same where only joints are tracked."""
+"""The same where nothing slides in a plane."""
 
 
 class Rival(Protocol):
@@ -174,7 +174,7 @@ def _sentence_other(rivals: Sequence[Rival], pairs: Sequence[tuple[int, int]]) -
 def other_than_a_shot(one: Rival, other: Rival) -> str:
     """What tells two models apart that no shot does."""
     names = {a.effect.name for a in one.laws} ^ {a.effect.name for a in other.laws}
-    joints = all(site.kind in JOINTS for site in one.simulator.moving.values())
+    joints = not any(site.kind in PLANAR for site in one.simulator.moving.values())
     if not names:
         return _ONE_AT_A_TIME if joints else _ALONE
     return (OF_JOINTS if joints else OTHER)[frozenset(sorted({str(EFFECTS[name].channel) for name in names})[-2:])]

@@ -14,6 +14,7 @@ from compass_ros.discovery.evidence import Tangent
 from compass_ros.discovery.settings import MOMENTS
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
+from compass_ros.simulation.extents import along
 from compass_ros.simulation.kicks import Kicks, inertias, kicks
 from compass_ros.simulation.sites import JOINTS, PLANAR, Site
 from compass_ros.types import Floats, Ints
@@ -21,8 +22,8 @@ from compass_ros.types import Floats, Ints
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """E episodes, D residuals of each, K moments, S directions of a discrepancy: first those of forces, one of a joint
-    and two of a body in the plane, then the C observed columns.
+    """E episodes, D residuals of each, K moments, S directions of a discrepancy: first those of forces, one of a joint,
+    two of a body in the plane, all of one in space, then the C observed columns.
 
     A push is an acceleration: a generalised force over the direction's own inertia.
     """
@@ -81,10 +82,29 @@ class Response:
         """(P,) of the cell's parameters, without those of laws."""
         return self.fit.point.values[: len(self.simulator.cell.parameters)]
 
+    def along(self, n: int) -> tuple[Floats, Floats]:
+        """(E, K, a) places of a site and (E, K, a) their rates: of a joint one number, in the plane two, in space three
+        of its centre of mass."""
+        if n < self.states.shape[2]:
+            a = 1 if self.sites[n].kind in JOINTS else 2
+            return self.states[:, :, n, :a], self.states[:, :, n, 2 : 2 + a]
+        name, states = self.sites[n].name, self.kicks.states
+        path = along(self.simulator.written(self.fit.point.values), [name], states)[name]
+        return path.position.reshape(*states.shape[:2], 3), path.velocity.reshape(*states.shape[:2], 3)
+
+    def follows(self, attached: Attached) -> bool:
+        """Whether a law is a force on what moves along a path, which pushes say all of."""
+        flat = [site.names[0] for site in self.sites[: self.states.shape[2]]]
+        effect = attached.effect
+        return effect.forces is not None and effect.moves and all(name in flat for name in attached.objects)
+
     @cached_property
     def states(self) -> Floats:
-        """(E, K, N, 6) of each site: x, y, vx, vy, mass, time; of a joint angle, 0, rate, 0, inertia, time."""
-        names = [site.names[0] for site in self.sites]
+        """(E, K, N, 6) of each site but bodies in space: x, y, vx, vy, mass, time; of a joint angle, 0, rate, 0,
+        inertia, time."""
+        names = list(self.simulator.moving)
+        if not names:
+            return np.zeros((*self.kicks.states.shape[:2], 0, 6))
         inputs = self.likelihood.inputs + self.fit.point.launch
         tiled = np.tile(self.fit.point.values, (len(inputs), 1))
         paths = self.simulator.paths(tiled, inputs, self.kicks.moments_s, names)
@@ -138,7 +158,7 @@ def respond(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> Response:
     point = fit.point
     inputs = likelihood.inputs + point.launch
     unit_kicks = kicks(simulator, point.values, inputs, likelihood.time_s, MOMENTS)
-    sites = tuple(simulator.moving.values())
+    sites = (*simulator.moving.values(), *simulator.in_space.values())
     site_of, dofs = directions(simulator, sites)
     matrices = inertias(simulator, point.values, unit_kicks.states)
     inertia = matrices[..., dofs, dofs].mean(axis=(0, 1))

@@ -80,11 +80,12 @@ def interval(response: Response, pushes: Floats, n: int | None, depends_on: Depe
     """The shortest range of an angle, or of a speed, that holds most of the pushes on one site; None: no such range."""
     if n is None or depends_on not in ("place", "velocity"):
         return None
-    states, joint = response.states[:, :, n].reshape(-1, 6), response.sites[n].kind in JOINTS
+    joint = response.sites[n].kind in JOINTS
+    place, rate = (one.reshape(-1, one.shape[2]) for one in response.along(n))
     unit = response.simulator.unit if joint else "m"
     if depends_on == "place" and not joint:
         return None
-    at = states[:, 0] if depends_on == "place" else np.hypot(states[:, 2], states[:, 3] if not joint else 0.0)
+    at = place[:, 0] if depends_on == "place" else np.linalg.norm(rate, axis=1)
     strength = np.sum(pushes[:, :, np.flatnonzero(response.site_of == n)] ** 2, axis=2).ravel()
     order = np.argsort(at)
     held = np.concatenate([[0.0], np.cumsum(strength[order]) / max(strength.sum(), 1e-300)])

@@ -87,8 +87,12 @@ class Path:
 
 def paths(model: mujoco.MjModel, bodies: Sequence[str], states: Floats) -> dict[str, Path]:
     """Of bodies in (E, T, s) full states of episodes, at SAMPLES moments of each."""
-    at = np.unique(np.linspace(0, states.shape[1] - 1, SAMPLES).astype(int))
-    data, moments = mujoco.MjData(model), states[:, at].reshape(-1, states.shape[2])
+    return along(model, bodies, states[:, np.unique(np.linspace(0, states.shape[1] - 1, SAMPLES).astype(int))])
+
+
+def along(model: mujoco.MjModel, bodies: Sequence[str], states: Floats) -> dict[str, Path]:
+    """Of bodies in (E, T, s) full states, at each of them."""
+    data, moments = mujoco.MjData(model), states.reshape(-1, states.shape[2])
     rows = np.stack([list(_moment(model, data, bodies, state)) for state in moments])  # (M, N, 9)
     return {name: Path(rows[:, i, :3], rows[:, i, 3:6], rows[:, i, 6:]) for i, name in enumerate(bodies)}
 

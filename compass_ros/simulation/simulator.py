@@ -200,6 +200,22 @@ class Simulator:
                 found.setdefault(name, site)
         return {name: found[name] for name in dict.fromkeys(name for name, _ in tracked) if name in found}
 
+    @cached_property
+    def in_space(self) -> Mapping[str, Site]:
+        """Tracked bodies that move in space by themselves: none of their degrees of freedom is a tracked joint's."""
+        model, joints = self.physics.model, set(self.moving)
+        tracked = {name for signal in self.cell.signals if signal.places and not signal.jointed for name in signal.at}
+        found: dict[str, Site] = {}
+        for name in sorted(tracked):
+            site = self.places.body(name)
+            if site is None or site.kind != "body":
+                continue
+            body = model.body(name)
+            own = range(int(body.jntadr[0]), int(body.jntadr[0]) + int(body.jntnum[0]))
+            if own and not any(model.joint(i).name in joints for i in own):
+                found[name] = site
+        return found
+
     def accepts(self, effect: Effect, objects: Sequence[str]) -> bool:
         """Whether these objects are sites of a kind on which an effect can act."""
         return not Attached(effect, tuple(objects)).objection(self.places)
