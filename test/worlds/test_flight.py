@@ -39,8 +39,8 @@ def test_without_laws_the_flight_is_the_simulators_at_the_true_parameters(name: 
     seen = simulated(cell, values, np.stack([first_state(one, ball) for one in throws]), time_s)
     made = np.stack([scene.played(ball, one, {}).pose(time_s[0]) for one in throws])
     made[:, :, 3:] *= np.sign(np.sum(made[:, :, 3:] * seen[:, :, 3:], axis=2, keepdims=True))
-    assert np.abs(made[:, :, :3] - seen[:, :, :3]).max() < 0.2 * scene.PLACE_M
-    assert np.abs(made[:, :, 3:] - seen[:, :, 3:]).max() < 0.2 * scene.ANGLE_RAD
+    assert np.abs(made[:, :, :3] - seen[:, :, :3]).max() < 0.01 * scene.PLACE_M
+    assert np.abs(made[:, :, 3:] - seen[:, :, 3:]).max() < 0.02 * scene.ANGLE_RAD
 
 
 @pytest.mark.parametrize(

@@ -110,7 +110,7 @@ def test_drives_are_late_slow_and_weak() -> None:
 
 
 def test_a_world_is_its_seed_alone() -> None:
-    asked = Asked(4, None, ("lens",))
+    asked = Asked(4, None, ("camera_scale",))
     one, again = (scene.conceal(TASK, asked) for _ in range(2))
     assert same(one, again)
-    assert [law["name"] for law in one.answer["laws"]] == ["lens"]  # type: ignore[attr-defined]
+    assert [law["name"] for law in one.answer["laws"]] == ["camera_scale"]  # type: ignore[attr-defined]

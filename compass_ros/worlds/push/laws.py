@@ -44,7 +44,7 @@ def speed_of(feet: Feet) -> Floats:
 
 def stribeck(rng: Generator) -> Drawn:
     """1 + a exp(-(v / vs)^n): n of 1/2 to 1 for dry metals (Bo and Pavelescu), 2 by Armstrong-Helouvry."""
-    more, at = float(rng.choice([1.0, 1.0, -0.5]) * rng.uniform(0.1, 0.7)), float(log_uniform(rng, 0.02, 0.15))
+    more, at = float(rng.choice([1.0, 1.0, -0.5]) * rng.uniform(0.15, 1.2)), float(log_uniform(rng, 0.02, 0.15))
     power = float(rng.choice([0.5, 1.0, 2.0]))
 
     def ratio(feet: Feet) -> Floats:
@@ -57,7 +57,7 @@ def stribeck(rng: Generator) -> Drawn:
 
 def film_of_oil(rng: Generator) -> Drawn:
     """Shear of a thin film: force in proportion to the slip."""
-    rate = float(log_uniform(rng, 0.3, 6.0))
+    rate = float(log_uniform(rng, 0.4, 12.0))
     source = "Armstrong-Helouvry (1991), Control of Machines with Friction, 2.3"
     return Drawn(("viscous_drag",), {"rate_1s": rate}, source, viscous_1s=rate)
 
@@ -103,7 +103,7 @@ def wedge(rng: Generator) -> Drawn:
 
 def rubbing_tool(rng: Generator) -> Drawn:
     """Coulomb friction where the tool touches: Lynch and Mason (1996), stable pushing."""
-    friction = float(log_uniform(rng, 0.03, 0.6))
+    friction = float(log_uniform(rng, 0.03, 0.8))
     source = "Lynch and Mason (1996), Int. J. Robot. Res. 15, 533"
     classes = ("tangential_impulse", "friction_cone")
     return Drawn(classes, {"friction": friction}, source, ("tool", "bar"), push_friction=friction)
@@ -113,8 +113,8 @@ _TOOL = ("tool_vx", "tool_vy")
 
 
 def late_drive(rng: Generator) -> Drawn:
-    """Fieldbus and controller: a few to 80 ms between command and motion."""
-    late = float(log_uniform(rng, 0.004, 0.08))
+    """Fieldbus and controller: a few to 120 ms between command and motion."""
+    late = float(log_uniform(rng, 0.006, 0.12))
 
     def drive(told: Told) -> Told:
         return lambda time: told(time - late)
@@ -125,7 +125,7 @@ def late_drive(rng: Generator) -> Drawn:
 
 def slow_drive(rng: Generator) -> Drawn:
     """A speed loop of first order: what was commanded arrives with a time constant."""
-    constant = float(log_uniform(rng, 0.01, 0.15))
+    constant = float(log_uniform(rng, 0.015, 0.25))
 
     def drive(told: Told) -> Told:
         def filtered(time: float) -> Floats:
@@ -185,9 +185,11 @@ def of_camera(name: str) -> Callable[[Generator], Drawn]:
 
 
 _OWN = (stribeck, film_of_oil, brushed, spill, wedge, rubbing_tool, late_drive, slow_drive, weak_drive)
+_SEEN = ("latency", "camera_scale", "camera_rotation", "rolling_shutter", "camera_shake")
+"""What shows where a bar moves by some centimetres; a lens and a clock would not."""
 _OUTSIDE = (run_in, corrugated)
 DRAW: Mapping[str, Callable[[Generator], Drawn]] = {f.__name__: f for f in (*_OWN, *_OUTSIDE)} | {
-    name: of_camera(name) for name in film.DRAW
+    name: of_camera(name) for name in _SEEN
 }
-OUTSIDE = ("run_in", "corrugated", *film.OUTSIDE)
+OUTSIDE = ("run_in", "corrugated", "camera_shake")
 KNOWN = tuple(name for name in DRAW if name not in OUTSIDE)

@@ -20,8 +20,8 @@ DURATION_S = 1.6
 BEFORE_S = 0.2
 PLACE_M, ANGLE_RAD = 1e-3, 0.01
 LOST = 0.02
-LOW = np.array([-0.045, 0.1, -0.08, 0.1, -0.08])
-HIGH = np.array([0.045, 0.3, 0.08, 0.4, 0.08])
+LOW = np.array([-0.03, 0.15, -0.06, 0.15, -0.06])
+HIGH = np.array([0.03, 0.3, 0.06, 0.4, 0.06])
 """Of a command: where across [m], two velocities [m/s]."""
 COMMAND = ("y", "vx1", "vy1", "vx2", "vy2")
 _SPARE_S = 0.06
