@@ -183,7 +183,6 @@ def raising(error: Exception) -> Callable[..., Discovery]:
     [
         ("discover", DataError("only 3 shots were found"), "not_evaluated", "only 3 shots were found"),
         ("discover", np.linalg.LinAlgError("Singular matrix"), "fit_failed", "Singular matrix"),
-        ("unexpected", np.linalg.LinAlgError("SVD did not converge"), "fit_failed", "SVD did not converge"),
         ("refine", np.linalg.LinAlgError("Singular matrix"), "fit_failed", "no solution"),
         ("refine", DataError("the episodes say nothing"), "not_evaluated", "the episodes say nothing"),
     ],
@@ -198,7 +197,6 @@ def test_a_search_that_cannot_be_done_leaves_the_calibration(
     says: str,
 ) -> None:
     monkeypatch.setattr(pipeline, "refine", lambda *_: None)
-    monkeypatch.setattr(pipeline, "unexpected", lambda *_: False)
     monkeypatch.setattr(pipeline, step, raising(error))
     ended, _ = calibrate(episodes, cell(), replace(CONFIG, discover=True))
     assert found(ended) == found(result)
@@ -213,7 +211,6 @@ def test_what_was_calibrated_is_handed_out_before_the_search(
     """Whatever ends the search, a bug, the user or the machine: nothing that was computed is lost."""
     kept: list[Result] = []
     monkeypatch.setattr(pipeline, "refine", lambda *_: None)
-    monkeypatch.setattr(pipeline, "unexpected", lambda *_: False)
     monkeypatch.setattr(pipeline, "discover", raising(error))
     with pytest.raises(type(error)):
         calibrate(episodes, cell(), replace(CONFIG, discover=True), keep=lambda r, _: kept.append(r))
