@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from compass_ros.simulation import Simulator
-from compass_ros.simulation.effects import EFFECTS, Attached, Effect
+from compass_ros.simulation.effects import EFFECTS, Attached, Effect, Quantity
 from compass_ros.simulation.sites import DRIVES, JOINTS, PLANAR, Site, SiteKind, names_of
 from compass_ros.simulation.sizes import JointSize, alike
 from compass_ros.simulation.visited import Visited
-from compass_ros.types import Floats
+from compass_ros.types import Bools, Floats
 
 ALIKE: tuple[tuple[SiteKind, ...], ...] = (PLANAR, *((kind,) for kind in JOINTS))
 """What moves in the same way: one number of an effect means the same for all of them."""
@@ -25,10 +27,29 @@ class Candidate:
     """An effect on certain objects."""
 
     attached: Attached
+    beside: tuple[Attached, ...] = ()
+    """The same law on further sites, with a size on each."""
 
     @property
     def name(self) -> str:
         return self.attached.effect.name
+
+    @property
+    def parts(self) -> tuple[Attached, ...]:
+        return (self.attached, *self.beside)
+
+    @property
+    def objects(self) -> tuple[str, ...]:
+        return tuple(name for part in self.parts for name in part.objects)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        return tuple(q for part in self.parts for q in part.effect.quantities)
+
+    @property
+    def amplitudes(self) -> Bools:
+        """(q,) which of the quantities are amplitudes."""
+        return np.array([q.amplitude for q in self.quantities])
 
     @property
     def by_force(self) -> bool:

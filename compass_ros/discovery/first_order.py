@@ -8,8 +8,9 @@ values falls by 1/2 g' S^-1 g, where S = T'T and g = T'r after the projection of
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -115,6 +116,37 @@ class FirstOrder:
         found = self._of_forces(candidate) if candidate.by_force else self._rolled_out(candidate)
         return sorted(found, key=lambda f: -f.gain)
 
+    def together(self, singles: Sequence[Ranked]) -> Ranked | None:
+        """One law on those of its sites that have the highest evidence, with a size on each; None: on less than two.
+
+        `singles`: the law on each site. Sites are added in turn while the evidence of the linear model grows by it.
+        """
+        columns = np.concatenate([r.columns for r in singles], axis=2)
+        matrix, pull = self.of_columns(columns)
+        first = np.cumsum([0, *(r.columns.shape[2] for r in singles)])
+        own = [np.arange(a, b) for a, b in pairwise(first)]
+        chosen: list[int] = []
+        best = 0.0
+        while len(chosen) < len(singles):
+            tried = {i: _evidence(matrix, pull, np.concatenate([own[k] for k in (*chosen, i)]))
+                     for i in range(len(singles)) if i not in chosen}  # fmt: skip
+            found = max(tried, key=lambda i: tried[i])
+            if tried[found] <= best:
+                break
+            best = tried[found]
+            chosen.append(found)
+        if len(chosen) < 2:
+            return None
+        parts = [singles[i] for i in sorted(chosen)]
+        candidate = Candidate(parts[0].candidate.attached, tuple(r.candidate.attached for r in parts[1:]))
+        at = np.concatenate([own[i] for i in sorted(chosen)])
+        low, high, scale = _bounds(candidate)
+        width = WIDTH * scale
+        sizes, gain = best_sizes(matrix[np.ix_(at, at)], pull[at], low / width, high / width, np.ones(len(at)))
+        numbers = np.concatenate([r.numbers for r in parts])
+        numbers[candidate.amplitudes] = sizes * width
+        return Ranked(candidate, numbers, columns[:, :, at], gain, any(r.seen for r in parts))
+
     # --- laws of forces
 
     def _of_forces(self, candidate: Candidate) -> list[Ranked]:
@@ -189,9 +221,15 @@ class FirstOrder:
 
 def _bounds(candidate: Candidate) -> tuple[Floats, Floats, Floats]:
     """(a,) lowest, highest and modest size of each amplitude."""
-    quantities = [q for q in candidate.attached.effect.quantities if q.amplitude]
+    quantities = [q for q in candidate.quantities if q.amplitude]
     low, high, scale = np.array([(q.low, q.high, q.scale) for q in quantities]).T
     return low, high, scale
+
+
+def _evidence(matrix: Floats, pull: Floats, at: Ints) -> float:
+    """Log evidence of some amplitudes of unit prior over their absence."""
+    inner = matrix[np.ix_(at, at)] + np.eye(len(at))
+    return 0.5 * float(pull[at] @ np.linalg.solve(inner, pull[at]) - np.linalg.slogdet(inner)[1])
 
 
 def best_sizes(matrix: Floats, pull: Floats, low: Floats, high: Floats, prior: Floats) -> tuple[Floats, float]:

@@ -27,15 +27,17 @@ EPISODES = 9
 that are not held out."""
 ETA = 3
 """One in so many goes on (Li et al. 2018, Hyperband: 3 or 4)."""
+FEW = 5
+"""Gauss-Newton steps of a fit that begins near its end."""
 _SLIGHT = 0.3
 """Gain [log likelihood] of a step that is the last one: models are compared by whole units."""
 
 
 def from_parent(parent: Hypothesis, ranked: Ranked, iterations: int) -> Hypothesis:
     """Fitted from the first-order solution about its parent's fit."""
-    attached = ranked.candidate.attached
-    simulator, likelihood = widened(parent.simulator, parent.likelihood, [attached])
-    amplitude = attached.amplitudes
+    laws = ranked.candidate.parts
+    simulator, likelihood = widened(parent.simulator, parent.likelihood, laws)
+    amplitude = ranked.candidate.amplitudes
     found = solve_beside(parent, ranked)
     tuned, base = parent.fit.free, parent.fit.point
     starts = []
@@ -50,21 +52,21 @@ def from_parent(parent: Hypothesis, ranked: Ranked, iterations: int) -> Hypothes
     everything = np.concatenate([tuned, len(base.values) + np.arange(len(amplitude))])
     linear = extended(parent.fit.linear, likelihood, starts[best], residuals[best], everything)
     fit = minimise(likelihood, starts[best], everything, iterations, parent.fit.robust, 1.0, linear, fresh=False)
-    return Hypothesis((*parent.laws, attached), simulator, likelihood, fit, parent.response)
+    return Hypothesis((*parent.laws, *laws), simulator, likelihood, fit, parent.response)
 
 
 def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:
     """(p,) first-order change of the parent's parameters beside a law at its first-order numbers."""
     tangent = parent.response.tangent
-    sizes = np.array([WIDTH * q.scale for q in ranked.candidate.attached.effect.quantities if q.amplitude])
-    moved = ranked.columns @ (ranked.numbers[ranked.candidate.attached.amplitudes] / sizes)
+    sizes = np.array([WIDTH * q.scale for q in ranked.candidate.quantities if q.amplitude])
+    moved = ranked.columns @ (ranked.numbers[ranked.candidate.amplitudes] / sizes)
     beside = replace(tangent, residual=tangent.residual + moved)
     change = np.zeros(len(parent.fit.free))
     change[parent.response.inside] = solve(beside, beside.normal, None).parameters
     return change
 
 
-def race(parent: Hypothesis, starts: Sequence[tuple[Attached, Floats]]) -> list[Hypothesis]:
+def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats]]) -> list[Hypothesis]:
     """The best two of models with one more law each, by successive halving over a growing horizon.
 
     A simulator without a law bends other parameters to stand for it, and from there a fit may end in a valley beside
@@ -76,8 +78,8 @@ def race(parent: Hypothesis, starts: Sequence[tuple[Attached, Floats]]) -> list[
     count = len(parent.likelihood.inputs)
     rows = np.unique(np.linspace(0, count - 1, min(count, EPISODES)).astype(int))
     values, begun, horizons = _unbent(parent, rows)
-    runners = [_runner(parent, attached, np.append(values, numbers), rows, begun, horizons)
-               for attached, numbers in starts]  # fmt: skip
+    runners = [_runner(parent, laws, np.append(values, numbers), rows, begun, horizons)
+               for laws, numbers in starts]  # fmt: skip
     alive = list(range(len(runners)))
     found: dict[int, Floats] = {}
     for _ in horizons:
@@ -110,19 +112,24 @@ def _shapes(laws: Sequence[Attached]) -> Ints:
 
 
 def _runner(
-    parent: Hypothesis, attached: Attached, values: Floats, rows: Ints, begun: Strongest, horizons: tuple[float, ...]
+    parent: Hypothesis,
+    laws: Sequence[Attached],
+    values: Floats,
+    rows: Ints,
+    begun: Strongest,
+    horizons: tuple[float, ...],
 ) -> Iterator[tuple[Likelihood, Fit]]:
     """Fits of one model to some episodes, longer from one to the next; shapes stay as they are."""
-    simulator, likelihood = widened(parent.simulator, parent.likelihood, [attached])
-    new = len(parent.fit.point.values) + np.flatnonzero(attached.amplitudes)
-    held = len(simulator.cell.parameters) + _shapes((*parent.laws, attached))
+    simulator, likelihood = widened(parent.simulator, parent.likelihood, laws)
+    new = len(parent.fit.point.values) + np.flatnonzero(np.concatenate([a.amplitudes for a in laws]))
+    held = len(simulator.cell.parameters) + _shapes((*parent.laws, *laws))
     begun = begun.beside(values, new, np.full(len(new), 1 / WIDTH))
     return growing(likelihood.of(rows), values, held, begun, horizons)
 
 
-def _whole(parent: Hypothesis, attached: Attached, values: Floats) -> Hypothesis:
+def _whole(parent: Hypothesis, laws: Sequence[Attached], values: Floats) -> Hypothesis:
     """A model fitted to all episodes from (P + q,) values, with the parent's parameters free."""
-    simulator, likelihood = widened(parent.simulator, parent.likelihood, [attached])
+    simulator, likelihood = widened(parent.simulator, parent.likelihood, laws)
     own = np.arange(len(parent.fit.point.values), len(values))
     free = np.concatenate([parent.fit.free, own])
     steps = np.concatenate([difference_steps(parent.fit.linear), np.full(len(own), 1 / WIDTH)])
@@ -130,7 +137,7 @@ def _whole(parent: Hypothesis, attached: Attached, values: Floats) -> Hypothesis
     robust = max(parent.fit.robust, 3.0 * typical_residual(likelihood, point))
     fit = minimise(likelihood, point, free, 5, robust, 3.0, steps=steps, fresh=False)
     fit = minimise(likelihood, fit.point, free, 5, parent.fit.robust, _SLIGHT)
-    return Hypothesis((*parent.laws, attached), simulator, likelihood, fit)
+    return Hypothesis((*parent.laws, *laws), simulator, likelihood, fit)
 
 
 def finished(hypothesis: Hypothesis) -> Hypothesis:
@@ -143,3 +150,25 @@ def further(hypothesis: Hypothesis, iterations: int) -> Hypothesis:
     fit = hypothesis.fit
     fit = minimise(hypothesis.likelihood, fit.point, fit.free, iterations, fit.robust, _SLIGHT, fit.linear)
     return replace(hypothesis, fit=fit, near=None)
+
+
+def without(model: Hypothesis, laws: Sequence[Attached]) -> Hypothesis:
+    """The same model fitted without some of its laws."""
+    kept = [attached for attached in model.laws if attached not in laws]
+    numbers = [np.arange(own.start, own.stop) for attached, own in model.own() if attached in kept]
+    cell = len(model.simulator.cell.parameters)
+    at = np.concatenate([np.arange(cell), *numbers])
+    simulator = model.simulator.with_effects([a for a in model.simulator.effects if a not in laws])
+    of_all = model.likelihood
+    likelihood = replace(
+        of_all,
+        predict=simulator.observe,
+        predict_alike=simulator.observe_alike,
+        parameters=simulator.parameters,
+        prior_mean=of_all.prior_mean[at],
+        prior_std=of_all.prior_std[at],
+    )
+    point = replace(model.fit.point, values=model.fit.point.values[at], cost=np.inf)
+    free = np.flatnonzero(np.isin(at, model.fit.free))
+    fit = minimise(likelihood, point, free, FEW, model.fit.robust, _SLIGHT)
+    return Hypothesis(tuple(kept), simulator, likelihood, fit)

@@ -124,8 +124,8 @@ class Hypothesis:
             at += size
 
     @cached_property
-    def distinct(self) -> bool:
-        """Whether each of its laws lies more than ERROR_BARS from zero, all its amplitudes together.
+    def weak(self) -> tuple[Attached, ...]:
+        """Its laws that lie within ERROR_BARS of zero, all amplitudes of one together.
 
         Error bars as the noise leaves them, and as the episodes disagree. Along directions of which the recordings say
         less than the prior nothing is judged: where only ratios show, all numbers are unsure by one common factor, and
@@ -139,11 +139,12 @@ class Hypothesis:
         axes = axes[:, told > 1.0]
         away = ((self.fit.point.values - self.likelihood.prior_mean) / self.likelihood.prior_std)[free]
         bars = [axes.T @ cov @ axes for cov in (errors, jackknife(self.likelihood, self.fit))]
+        out = []
         for attached, numbers in self.own():
             own = np.isin(free, numbers.start + np.flatnonzero(attached.amplitudes))
             if not attached.effect.scattered and any(_within(away[own], axes[own] @ c @ axes[own].T) for c in bars):
-                return False
-        return True
+                out.append(attached)
+        return tuple(out)
 
     @property
     def rho(self) -> float:

@@ -7,6 +7,7 @@ a discrepancy.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from math import log
@@ -16,7 +17,7 @@ import numpy as np
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.first_order import FirstOrder, Ranked
-from compass_ros.discovery.fits import finished, from_parent, further, race
+from compass_ros.discovery.fits import finished, from_parent, further, race, without
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.scatter import ranked_scatter, with_scatter
 from compass_ros.discovery.settings import PRIOR_LAW, PRIOR_UNKNOWN, RHO, RHO_PRIOR
@@ -42,12 +43,15 @@ class Prior:
     """
 
     sites: dict[str, int]
-    """Choices of sites by name of law."""
+    """Choices of sites by name of law: each set of single ones with a size on each, and those with one for all."""
 
     @staticmethod
     def of(candidates: Sequence[Candidate]) -> Prior:
-        names = [c.name for c in candidates]
-        return Prior({name: names.count(name) for name in dict.fromkeys(names)})
+        singles, shared = Counter[str](), Counter[str]()
+        for c in candidates:
+            (singles if len(c.objects) <= 1 else shared)[c.name] += 1
+        names = dict.fromkeys(c.name for c in candidates)
+        return Prior({name: 2 ** singles[name] - 1 + shared[name] for name in names})
 
     def of_laws(self, names: Iterable[str]) -> float:
         """Each law counts once, whatever its sites."""
@@ -79,9 +83,14 @@ Tell = Callable[[str, float], bool]
 
 def rank(first: FirstOrder, candidates: Sequence[Candidate]) -> list[Ranked]:
     """Laws at their best shape, the one that promises most first."""
-    of_chance = [[ranked_scatter(first.response, c)] for c in candidates if c.attached.effect.scattered]
-    found = [*(first.ranked(c)[:1] for c in candidates if not c.attached.effect.scattered), *of_chance]
-    return sorted((f for some in found for f in some), key=lambda f: -f.gain)
+    of_chance = [ranked_scatter(first.response, c) for c in candidates if c.attached.effect.scattered]
+    found = [best for c in candidates if not c.attached.effect.scattered for best in first.ranked(c)[:1]]
+    alone: dict[str, list[Ranked]] = {}
+    for one in found:
+        if len(one.candidate.objects) == 1 and one.gain > 0:
+            alone.setdefault(one.candidate.name, []).append(one)
+    several = (first.together(singles) for singles in alone.values() if len(singles) > 1)
+    return sorted([*found, *of_chance, *(one for one in several if one)], key=lambda f: -f.gain)
 
 
 def search(
@@ -145,7 +154,8 @@ def finish(
 
     What a fit still lacks there, and rough differences, are worth some units of log evidence: as much as two laws may
     be apart. One with a law that is within its error bars of zero, as the noise leaves them or as the episodes disagree
-    on it (`Hypothesis.distinct`), is the model without that law, and goes. `others`: log odds of models without a law.
+    on it (`Hypothesis.weak`), is the model without that law, and stands for it. `others`: log odds of models without
+    a law.
     """
     done: set[str] = set()
     while True:
@@ -160,10 +170,13 @@ def finish(
             return
         done.add(name)
         model = finished(known[name][0])
-        if model.distinct:
+        if not model.weak:
             known[name] = model, odds_of(model, model.log_evidence)
-        else:
-            del known[name]
+            continue
+        del known[name]
+        if len(model.weak) < len(model.laws):
+            less = without(model, model.weak)
+            known.setdefault(less.name, (less, odds_of(less, less.log_evidence)))
 
 
 def calls_for_more(model: Hypothesis, price: float) -> bool:
@@ -175,29 +188,29 @@ def calls_for_more(model: Hypothesis, price: float) -> bool:
 
 
 def promising(ranked: Sequence[Ranked], parent: Hypothesis) -> list[Ranked]:
-    """Those that the parent does not have; of each name the best two choices of sites."""
-    has = {(a.effect.name, a.objects) for a in parent.laws}
+    """Those that the parent does not have on any of their sites; of each name the best two choices of sites."""
+    has = {(a.effect.name, name) for a in parent.laws for name in a.objects or ("",)}
     out: list[Ranked] = []
     for r in ranked:
-        key = (r.candidate.name, r.candidate.attached.objects)
-        if r.gain > 0 and key not in has and sum(o.candidate.name == r.candidate.name for o in out) < 2:
+        own = {(r.candidate.name, name) for name in r.candidate.objects or ("",)}
+        if r.gain > 0 and not own & has and sum(o.candidate.name == r.candidate.name for o in out) < 2:
             out.append(r)
     return out
 
 
-def cold_starts(ranked: Sequence[Ranked], parent: Hypothesis) -> list[tuple[Attached, Floats]]:
+def cold_starts(ranked: Sequence[Ranked], parent: Hypothesis) -> list[tuple[tuple[Attached, ...], Floats]]:
     """Each law that the parent lacks, on the sites that promise most, at a modest size."""
     has = {a.effect.name for a in parent.laws}
     best: dict[str, Ranked] = {}
     for r in ranked:
         if r.candidate.name not in has and not r.candidate.attached.effect.scattered:
             best.setdefault(r.candidate.name, r)
-    return [(r.candidate.attached, modest(r)) for r in best.values()]
+    return [(r.candidate.parts, modest(r)) for r in best.values()]
 
 
 def modest(ranked: Ranked) -> Floats:
     """(q,) numbers: amplitudes at their modest sizes, shapes as first order has them or where they begin."""
-    quantities = ranked.candidate.attached.effect.quantities
+    quantities = ranked.candidate.quantities
     sizes = [q.scale if q.amplitude else (n if ranked.gain > 0 else q.start)
              for q, n in zip(quantities, ranked.numbers, strict=True)]  # fmt: skip
     return np.array(sizes)

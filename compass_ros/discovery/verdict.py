@@ -121,13 +121,16 @@ class Judge:
             for law in _explained(best)
         )
         first = next(own for _, own in best.own())
-        where = where_of(best.laws[0], values[first], self.simulator.movers())
+        where = where_of(best.laws, values[first], self.simulator.movers())
         following = ""
         lacks = " and ".join(dict.fromkeys(a.effect.sentence for a in best.laws))
         if verdict == "ambiguous":
             following = next_experiment(self.simulator, best.likelihood, models, self.seed).sentence
             lacks = "one of these: " + "; ".join(dict.fromkeys(m.name for m in models))
-        sizes = "; ".join(value_of(f, a) for f, a in zip(findings, best.laws, strict=True))
+        names = [a.effect.name for a in best.laws]
+        sizes = "; ".join(
+            value_of(f, a, names.count(a.effect.name) > 1) for f, a in zip(findings, best.laws, strict=True)
+        )
         said = errors(self._before, after, self._floor, self.simulator.unit)
         sentence = f"{place(where, self._flat)}, the simulator lacks {lacks}; {sizes}; {said}."
         return self._said(verdict, sentence, where, findings, following, best)

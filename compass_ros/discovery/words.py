@@ -28,13 +28,17 @@ OF_JOINTS = IN_WORDS | {"strike": "In the drive", "free": "In the motion", "wall
 """The same where nothing slides on a table."""
 
 
-def where_of(attached: Attached, numbers: Floats, movers: Sequence[str]) -> Where:
-    """Object, phase, channel and region of a fitted effect."""
+def where_of(laws: Sequence[Attached], numbers: Floats, movers: Sequence[str]) -> Where:
+    """Object, phase, channel and region of the first of some fitted laws; on all sites that it acts on.
+
+    (q,) numbers of it.
+    """
+    attached = laws[0]
     effect = attached.effect
     phase = PHASE.get(effect.name, OF_CHANNEL[effect.channel])
-    objects = attached.objects
-    told = len(movers) > 1 or not effect.moves
-    one = objects[0] if len(objects) == 1 and told else "all"
+    objects = dict.fromkeys(name for law in laws if law.effect.name == effect.name for name in law.objects)
+    told = bool(objects) and set(objects) != set(movers)
+    one = " and ".join(objects) if told else "all"
     names = [q.name for q in effect.quantities]
     region = None
     if "centre_x" in names:
@@ -70,8 +74,8 @@ DEPENDS: dict[DependsOn | None, str] = {
 """What a difference that no law explains is a function of."""
 
 
-def value_of(finding: EffectFinding, attached: Attached) -> str:
-    """The effect and its amplitudes: 'fan_field, strength 0.21 +- 0.01 m/s^2'.
+def value_of(finding: EffectFinding, attached: Attached, told: bool) -> str:
+    """The effect and its amplitudes: 'fan_field, strength 0.21 +- 0.01 m/s^2'; `told`: with what it acts on.
 
     A law that is clearly there and has wide error bars is known by its ratio to numbers of the scene.
     """
@@ -83,7 +87,8 @@ def value_of(finding: EffectFinding, attached: Attached) -> str:
             unit = "" if found.unit == "1" else f" {found.unit}"
             numbers.append(f"{quantity.name} {found.value:.3g} +- {found.std:.1g}{unit}")
     ratio = " (only its ratio to numbers of the scene shows)" if wide else ""
-    return f"{finding.name}, {', '.join(numbers)}{ratio}"
+    on = f" of {', '.join(attached.objects)}" if told else ""
+    return f"{finding.name}{on}, {', '.join(numbers)}{ratio}"
 
 
 def errors(before: float, after: float, floor: float, unit: Unit) -> str:

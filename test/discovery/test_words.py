@@ -13,11 +13,13 @@ def test_every_amplitude_and_no_shape_is_said() -> None:
     numbers = {"tilt_x": EffectParameter(3.1e-3, 5e-5, "rad"), "tilt_y": EffectParameter(-4e-3, 5e-5, "rad")}
     tilt = EffectFinding("table_tilt", numbers, Evidence(0.9, 100.0, 0.001), ())
     said = "table_tilt, tilt_x 0.0031 +- 5e-05 rad, tilt_y -0.004 +- 5e-05 rad"
-    assert value_of(tilt, Attached(EFFECTS["table_tilt"], ("puck1",))) == said
+    assert value_of(tilt, Attached(EFFECTS["table_tilt"], ("puck1",)), told=False) == said
+    assert value_of(tilt, Attached(EFFECTS["table_tilt"], ("puck1",)), told=True) == said.replace(",", " of puck1,", 1)
 
     swirl = EFFECTS["swirl"]
     found = {q.name: EffectParameter(0.25, 0.01, q.unit) for q in swirl.quantities}
-    words = value_of(EffectFinding("swirl", found, Evidence(0.9, 100.0, 0.001), ()), Attached(swirl, ("puck1",)))
+    finding = EffectFinding("swirl", found, Evidence(0.9, 100.0, 0.001), ())
+    words = value_of(finding, Attached(swirl, ("puck1",)), told=False)
     assert words == "swirl, strength 0.25 +- 0.01 m/s^2"
 
 
@@ -25,7 +27,7 @@ def test_a_field_on_one_of_two_pucks_has_a_place() -> None:
     fan = Attached(EFFECTS["fan_field"], ("puck1",))
     given = {"strength": 0.2, "centre_x": 0.02, "centre_y": -0.01, "radius": 0.12}
     numbers = [given.get(q.name, q.start) for q in fan.effect.quantities]
-    where = where_of(fan, np.array(numbers), ("puck1", "puck2"))
+    where = where_of([fan], np.array(numbers), ("puck1", "puck2"))
     assert place(where) == "On free slides of puck1, within 12 cm of (0.02, -0.01)"
-    both = where_of(Attached(fan.effect, ("puck1", "puck2")), np.array(numbers), ("puck1", "puck2"))
+    both = where_of([Attached(fan.effect, ("puck1", "puck2"))], np.array(numbers), ("puck1", "puck2"))
     assert place(both).startswith("On free slides, within")
