@@ -4,7 +4,7 @@
 #   make demo    the main job: a virtual robot cell plays shots, and the calibrator finds what is wrong with the simulator
 #   make test    ruff, mypy, all tests
 #   make prove   120 sealed worlds: conceal, calibrate blindly, unseal, count; goes on where it was stopped
-#   make real    cubes, balls and pendulums that others recorded (docs/real-data.md); the data lie in COMPASS_REAL_DATA
+#   make league  recordings of others against answers written down before (docs/real-data.md); also `make real`
 #   make soak    half an hour of full load: memory, lost messages, latency; ARGS="--minutes 5" for less
 #   make fuzz    100,000 damaged bags, 100,000 damaged YAML files, and the cells; a nightly job. make test tries some hundreds
 #   make cells   200 cells drawn at random, recorded and calibrated: results, one-line refusals, tracebacks
@@ -29,7 +29,7 @@ NATIVE := $(wildcard compass_ros/simulation/native/*.[ch])
 READERS := test/readers
 RERUN   := .venv-rerun
 
-.PHONY: demo prove real test lint bench bags readers install interfaces lock clean soak fuzz cells
+.PHONY: demo prove real league test lint bench bags readers install interfaces lock clean soak fuzz cells
 .DELETE_ON_ERROR:
 
 demo: install
@@ -73,8 +73,8 @@ bench: install
 bags: install
 	$(BIN)/python scripts/record_bags.py
 
-real: install
-	$(BIN)/compass real --out out/real $(ARGS)
+real league: install
+	$(BIN)/compass real --page docs/real-data.md $(ARGS)
 
 prove: install
 	$(BIN)/compass prove --worlds 120 --jobs $(JOBS) --out proof/results.jsonl --page docs/proof.md $(ARGS)

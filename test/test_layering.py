@@ -85,8 +85,10 @@ NEIGHBOURS = {
     ("discovery", "simulation"),
     ("discovery", "calibration"),
     ("policy", "simulation"),
+    ("real", "proof"),
 }
-"""Steps of one layer that know each other: what is simulated is a cell, and an effect is part of a simulator."""
+"""Parts of one layer that know each other: what is simulated is a cell, an effect is part of a simulator, and sealed
+worlds and recordings of others are judged by the same command."""
 
 
 def part_of(path: Path) -> str:

@@ -33,9 +33,8 @@ def discover(
     if lacking := _lacking(simulator, len(likelihood.inputs)):
         return not_evaluated(lacking)
     try:
-        warnings = objections(
-            simulator.cell, likelihood.inputs, 1 / float(np.median(np.diff(likelihood.time_s, axis=1)))
-        )
+        rate_hz = 1 / float(np.median(np.diff(likelihood.time_s, axis=1)))
+        warnings = objections(simulator.cell, likelihood.inputs, rate_hz, simulator.places.touching)
     except DataError as error:
         return Discovery(Mismatch("data_bad", None, (), (), "", f"These recordings cannot answer: {error}."))
 

@@ -14,15 +14,18 @@ SAME, ALIKE = 0.01, 0.05
 """Distance of two commands, in parts of what the robot can do: the same shot again; hardly another one."""
 
 
-def objections(cell: Cell, inputs: Floats, rate_hz: float) -> tuple[str, ...]:
-    """What speaks against (E, A) shots recorded at a rate, as warnings. Raises DataError where they cannot answer."""
-    if rate_hz < REFUSED_HZ:
+def objections(cell: Cell, inputs: Floats, rate_hz: float, touching: bool = True) -> tuple[str, ...]:
+    """What speaks against (E, A) shots recorded at a rate, as warnings. Raises DataError where they cannot answer.
+
+    `touching`: things of the scene can touch; where they cannot, the rate is no objection.
+    """
+    if touching and rate_hz < REFUSED_HZ:
         raise DataError(
             f"{rate_hz:.3g} frames a second are too slow: contacts last less than a frame, and parameters come out "
             f"40-56 % wrong at 15; expected {REFUSED_HZ:g} or more"
         )
     out = []
-    if rate_hz < SLOW_HZ:
+    if touching and rate_hz < SLOW_HZ:
         out.append(f"{rate_hz:.3g} frames a second are few; {SLOW_HZ:g} or more show contacts")
     shots = "shots" if cell.action else "episodes"
     if len(inputs) < REFUSED_SHOTS:

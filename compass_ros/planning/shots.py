@@ -47,7 +47,7 @@ def look(
     low, high = (np.array([getattr(a, side) for a in cell.action]) for side in ("low", "high"))
     actions = rng.uniform(low, high, (n, len(low))) if given is None else given
     inputs = completed(cell, actions)
-    warnings = objections(cell, inputs, rate)
+    warnings = objections(cell, inputs, rate, simulator.places.touching)
     count, fields = len(inputs), len(cell.action)
     pool = draw(simulator, tries * count, rng) if propose else inputs[:0]
     response = linearised(simulator, np.concatenate([inputs, pool]), rate, cell.spec.noise_m)

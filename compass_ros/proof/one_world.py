@@ -57,7 +57,7 @@ class Concealed:
     def blindly(self, *words: str) -> tuple[str, float]:
         """A command of the suite that cannot read the answers: what went wrong, and how long it took [s]."""
         blind = [sys.executable, "-m", "compass_ros.concealed.blind", str(self.answers), *words]
-        return _timed(blind, self.root)
+        return timed(blind, self.root)
 
 
 @contextmanager
@@ -67,7 +67,7 @@ def concealed(suite: Suite, seed: int) -> Iterator[Concealed]:
         root = Path(folder)
         world, answers = root / "world", root / "answers"
         conceal = ["conceal", "--seed", str(seed), "--out", str(world), "--answers", str(answers), *suite.options]
-        error, seconds = _timed([sys.executable, "-m", "compass_ros.cli", *conceal], root)
+        error, seconds = timed([sys.executable, "-m", "compass_ros.cli", *conceal], root)
         yield Concealed(root, world, answers, f"conceal: {error}" if error else "", seconds)
 
 
@@ -108,20 +108,21 @@ def _effects(answer: Mapping[str, object]) -> list[Mapping[str, object]]:
     return effects
 
 
-def _timed(command: list[str], folder: Path) -> tuple[str, float]:
+def timed(command: list[str], folder: Path, limit_s: float = LIMIT_S) -> tuple[str, float]:
+    """Run a command in a folder: what went wrong, empty where nothing did, and how long it took [s]."""
     began = time.monotonic()
-    error = _call(command, folder)
+    error = _call(command, folder, limit_s)
     return error, round(time.monotonic() - began, 2)
 
 
-def _call(command: list[str], folder: Path) -> str:
+def _call(command: list[str], folder: Path, limit_s: float) -> str:
     """Run to the end; what went wrong as one line, empty where nothing did. One thread for linear algebra."""
     quiet = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     try:
         done = subprocess.run(
-            command, cwd=folder, env=os.environ | quiet, capture_output=True, text=True, timeout=LIMIT_S, check=False
+            command, cwd=folder, env=os.environ | quiet, capture_output=True, text=True, timeout=limit_s, check=False
         )
     except subprocess.TimeoutExpired:
-        return f"took longer than {LIMIT_S} s"
+        return f"took longer than {limit_s:g} s"
     said = (done.stderr or done.stdout).strip().splitlines()
     return "" if done.returncode == 0 else f"status {done.returncode}: {said[-1] if said else 'said nothing'}"

@@ -1,1 +1,1 @@
-"""Studies of real recordings: cubes, balls and pendulums that others measured. Start with `table.Study`."""
+"""The league: recordings of others, judged by `compass calibrate` against answers that were written down before."""

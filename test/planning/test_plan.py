@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from compass_ros.cells import load
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.objections import objections
 from compass_ros.errors import DataError
@@ -130,6 +131,11 @@ def test_a_good_set_meets_no_objection() -> None:
 def test_what_cannot_answer_is_refused(given: Floats, rate: float, words: str) -> None:
     with pytest.raises(DataError, match=words):
         objections(cell(), given, rate)
+
+
+@pytest.mark.parametrize("rate", [5.0, 10.0, 15.0, 24.0, 27.0])
+def test_a_slow_camera_is_no_objection_where_nothing_can_touch(rate: float) -> None:
+    assert objections(load("ball_drop"), np.zeros((12, 0)), rate, touching=False) == ()
 
 
 @pytest.mark.parametrize(
