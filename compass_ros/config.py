@@ -78,6 +78,13 @@ class CalibrationConfig:
         default=0, ge=0, description="most simulated rollouts of the method; 0 = what it takes by default"
     )
     discover: bool = Field(default=True, description="look for missing physics after the calibration")
+    false_alarm: float = Field(
+        default=0.01,
+        ge=1e-4,
+        lt=0.5,
+        description="probability of a verdict other than `none` where nothing is missing; at least 0.0001, for the "
+        "threshold is simulated with two recordings beyond it",
+    )
     held_out_share: float = Field(default=0.25, ge=0, lt=1, description="share of the episodes that is never fitted")
     episodes: int = Field(
         default=100, ge=1, description="most episodes that are used; of more, so many are taken evenly over their order"

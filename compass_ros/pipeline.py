@@ -73,7 +73,7 @@ def calibrate(
             begun = not_evaluated("the search has not ended")
             known = assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, begun, yardsticks)
             keep(noted(known), begun)
-        found = searched(simulator, problem, estimate, refined, unseen, noise, config.seed, steady.share(first, 1.0))
+        found = searched(simulator, problem, estimate, refined, unseen, noise, config, steady.share(first, 1.0))
     result = assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, found, yardsticks)
     if estimate.note:
         told.append(estimate.note)
@@ -90,13 +90,13 @@ def searched(
     refined: Refined | None,
     unseen: Likelihood,
     noise: Noise,
-    seed: int,
+    config: CalibrationConfig,
     report: Report,
 ) -> Discovery:
     """What is missing, or why that cannot be said: the calibration stands either way."""
     try:
         refined = refined or refine(problem.likelihood, estimate.values)
-        return discover(simulator, refined, unseen, noise, seed, report)
+        return discover(simulator, refined, unseen, noise, config.false_alarm, config.seed, report)
     except DataError as error:
         return not_evaluated(str(error))
     except np.linalg.LinAlgError as error:

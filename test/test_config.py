@@ -58,6 +58,9 @@ def test_the_papers_hyperparameters_are_the_defaults() -> None:
         ({"compass": {"n_rounds": 3}}, ["compass.n_rounds", "did you mean 'n_round'?"]),
         ({"compass": {"hidden_dim": ["wide"]}}, ["compass.hidden_dim", "found"]),
         ({"discover": None}, ["discover", "found None"]),
+        ({"false_alarm": 0}, ["false_alarm", "greater than or equal to 0.0001", "found 0"]),
+        ({"false_alarm": 0.5}, ["false_alarm", "less than 0.5", "found 0.5"]),
+        ({"false_alarm": "never"}, ["false_alarm", "found 'never'"]),
     ],
 )
 def test_what_is_wrong_is_named(content: dict[str, object], words: list[str]) -> None:

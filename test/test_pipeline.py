@@ -171,6 +171,22 @@ def test_no_method_ends_farther_than_it_began(
     assert result.warnings[0].endswith("the defaults stay")
 
 
+@pytest.mark.parametrize("alpha", [0.0001, 0.001, 0.01, 0.05, 0.3])
+def test_the_search_is_told_the_false_alarm_rate_that_was_asked_for(
+    episodes: list[Episode], monkeypatch: pytest.MonkeyPatch, alpha: float
+) -> None:
+    asked: list[object] = []
+
+    def discover(*given: object) -> Discovery:
+        asked.append(given[4])
+        return not_evaluated("it was asked only")
+
+    monkeypatch.setattr(pipeline, "refine", lambda *_: None)
+    monkeypatch.setattr(pipeline, "discover", discover)
+    calibrate(episodes, cell(), replace(CONFIG, discover=True, false_alarm=alpha))
+    assert asked == [alpha]
+
+
 def raising(error: Exception) -> Callable[..., Discovery]:
     def discover(*_: object) -> Discovery:
         raise error

@@ -57,11 +57,14 @@ def calibrate(
     episodes: Annotated[int, typer.Option(min=1, help="most episodes to use; of more, an even choice")] = 100,
     config: Annotated[Path | None, typer.Option(help="YAML with any field of the configuration")] = None,
     discover: Annotated[bool, typer.Option(help="look for missing physics after the calibration")] = True,
+    false_alarm: Annotated[
+        float, typer.Option(help="probability of naming something, or `unknown`, where nothing is missing")
+    ] = 0.01,
     progress: Annotated[ProgressStyle, typer.Option(help="how to show progress")] = ProgressStyle.bar,
     repeat: Annotated[str, typer.Option(hidden=True, help="the command that the report gives; empty: this one")] = "",
 ) -> None:
     """Find which simulator parameters are wrong, what they should be, and what physics is missing."""
-    given = settings(method, seed, rollouts, held_out, episodes, discover, config, parameters)
+    given = settings(method, seed, rollouts, held_out, episodes, discover, config, parameters, false_alarm)
     run(bags, cell, out, given, progress, repeat or shlex.join(["compass", *sys.argv[1:]]))
 
 
@@ -73,7 +76,8 @@ def settings(
     episodes: int,
     discover: bool,
     config: Path | None,
-    parameters: Parameters = Parameters.cell,
+    parameters: Parameters,
+    false_alarm: float,
 ) -> Mapping[str, object]:
     """The configuration file's fields over the command line's."""
     from compass_ros.config import read_yaml
@@ -86,6 +90,7 @@ def settings(
         "held_out_share": held_out,
         "episodes": episodes,
         "discover": discover,
+        "false_alarm": false_alarm,
     }
     return given | (dict(read_yaml(config)) if config else {})
 

@@ -20,15 +20,23 @@ from compass_ros.errors import DataError
 from compass_ros.simulation import Simulator
 from compass_ros.types import Mismatch, Progress, Report
 
-ALPHA = 0.01
-"""Probability of a verdict other than `none` where nothing is missing."""
 MIN_EPISODES = 3
 
 
 def discover(
-    simulator: Simulator, refined: Refined, held_out: Likelihood, noise: Noise, seed: int, report: Report
+    simulator: Simulator,
+    refined: Refined,
+    held_out: Likelihood,
+    noise: Noise,
+    alpha: float,
+    seed: int,
+    report: Report,
 ) -> Discovery:
-    """Look for what the calibrated simulator lacks. `held_out`: episodes that are opened after the verdict."""
+    """Look for what the calibrated simulator lacks.
+
+    `held_out`: episodes that are opened after the verdict. `alpha`: probability of a verdict other than `none` where
+    nothing is missing.
+    """
     likelihood = refined.likelihood
     if lacking := _lacking(simulator, len(likelihood.inputs)):
         return not_evaluated(lacking)
@@ -42,7 +50,7 @@ def discover(
         return report(Progress(stage, 0, done, float("nan"), float("nan")))
 
     tell("screen effects", 0.0)
-    return weigh(simulator, refined, held_out, noise, seed, tell, warnings)
+    return weigh(simulator, refined, held_out, noise, alpha, seed, tell, warnings)
 
 
 def weigh(
@@ -50,6 +58,7 @@ def weigh(
     refined: Refined,
     held_out: Likelihood,
     noise: Noise,
+    alpha: float,
     seed: int,
     tell: Tell,
     warnings: tuple[str, ...] = (),
@@ -60,15 +69,16 @@ def weigh(
     asked = candidates(simulator, plain.response.values, likelihood.inputs, likelihood.time_s)
     first = rank(FirstOrder(plain.response), asked)
     prior = Prior.of(asked)
-    odds = largest_odds(plain.response, first, [prior.of_laws([f.candidate.name]) for f in first], noise, seed)
-    threshold = max(float(np.quantile(odds, 1 - ALPHA)), 0.0)
+    priors = [prior.of_laws([f.candidate.name]) for f in first]
+    odds = largest_odds(plain.response, first, priors, noise, alpha, seed)
+    threshold = max(float(np.quantile(odds, 1 - alpha)), 0.0)
     tell("fit effects", 0.3)
     found = search(plain, first, asked, threshold, tell)
     best = max([found.unknown, *found.odds])
     if best > threshold and (cause := numerics_as_model(plain, best)):
         return fit_failed(f"{cause}, which is the simulator's numerics and not physics")
     tell("weigh effects", 0.95)
-    return Judge(found, held_out, noise, ALPHA, threshold, odds, undetectable(first), seed, warnings).discovery()
+    return Judge(found, held_out, noise, alpha, threshold, odds, undetectable(first), seed, warnings).discovery()
 
 
 def undetectable(first: list[Ranked]) -> tuple[str, ...]:

@@ -20,21 +20,36 @@ from compass_ros.discovery.response import Response
 from compass_ros.discovery.settings import PRIOR_UNKNOWN
 from compass_ros.types import Floats
 
-DRAWS = 200
-"""Simulated recordings: two of them lie beyond the odds that noise exceeds with probability 0.01."""
+BEYOND = 2
+"""Simulated recordings that lie beyond the odds that noise exceeds with probability alpha: 2 / alpha are drawn."""
+AT_ONCE = 200
+"""Of them, those that are in memory together."""
 
 
 def largest_odds(
-    response: Response, ranked: Sequence[Ranked], priors: Sequence[float], noise: Noise, seed: int
+    response: Response, ranked: Sequence[Ranked], priors: Sequence[float], noise: Noise, alpha: float, seed: int
 ) -> Floats:
-    """(DRAWS,) largest log posterior odds against the plain model, in recordings simulated from it.
+    """(BEYOND / alpha,) largest log posterior odds against the plain model, in recordings simulated from it.
 
     `priors`: log prior odds of each ranked law.
     """
+    rng, left = np.random.default_rng(seed), round(BEYOND / alpha)
+    counts = [min(AT_ONCE, left - begun) for begun in range(0, left, AT_ONCE)]
+    return np.concatenate([_largest_odds(response, ranked, priors, noise, rng, count) for count in counts])
+
+
+def _largest_odds(
+    response: Response,
+    ranked: Sequence[Ranked],
+    priors: Sequence[float],
+    noise: Noise,
+    rng: np.random.Generator,
+    count: int,
+) -> Floats:
+    """(count,) of them."""
     tangent = response.tangent
-    weight = robust_weight(tangent.residual, tangent.robust)
-    rng, rows = np.random.default_rng(seed), tangent.residual.shape
-    draws = np.stack([simulated(response, noise, rng).reshape(rows) for _ in range(DRAWS)], axis=2)
+    weight, rows = robust_weight(tangent.residual, tangent.robust), tangent.residual.shape
+    draws = np.stack([simulated(response, noise, rng).reshape(rows) for _ in range(count)], axis=2)
     weighted = draws * (weight / tangent.correlation_time)[:, :, None]
     squares = np.einsum("edm,edm->m", weighted, draws)
 

@@ -12,7 +12,7 @@ from compass_ros.calibration.methods import method
 from compass_ros.cells import load
 from compass_ros.episodes import find_each
 from compass_ros.errors import ConfigError, shown
-from compass_ros.nodes.job import Request
+from compass_ros.nodes.job import FALSE_ALARM, Request
 from compass_ros.nodes.managed import ManagedNode
 from compass_ros.nodes.requests import checked_output, checked_paths, wrong_text
 
@@ -27,6 +27,9 @@ def declare_calibrator(node: ManagedNode) -> None:
     declare("seed", 0, "seed of all random numbers", integer_range=natural)
     declare("rollouts", 0, "budget of simulated rollouts [count]; 0: the method's default", integer_range=natural)
     declare("method", "default", "as `compass calibrate --method`", _wrong_method)
+    rate = "probability of a verdict other than `none` where nothing is missing, as `compass calibrate --false-alarm`"
+    limits = [FloatingPointRange(from_value=1e-4, to_value=0.49)]
+    declare("verdict_false_alarm", FALSE_ALARM, rate, floating_point_range=limits)
     newest = "of the episodes that the recorder finishes, only so many of the newest are read; of more than 100 "
     newest += "a calibration uses an even choice of 100"
     declare("newest", 100, newest, integer_range=[IntegerRange(from_value=1, to_value=10_000, step=1)])
@@ -80,6 +83,7 @@ def request_of(node: ManagedNode, goal: Calibrate.Goal, recorded: Sequence[str])
         rollouts=goal.rollouts or node.get_parameter("rollouts").value,
         output=output,
         method=node.get_parameter("method").value,
+        false_alarm=node.get_parameter("verdict_false_alarm").value,
     )
 
 

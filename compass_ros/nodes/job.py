@@ -26,12 +26,14 @@ from typing import IO
 
 import yaml
 
+from compass_ros.config import CalibrationConfig
 from compass_ros.errors import ConfigError
 from compass_ros.nodes.journal import Journal
 from compass_ros.types import Progress
 
 ORIGIN = "origin.yaml"
 """What a result came from, beside it."""
+FALSE_ALARM = CalibrationConfig().false_alarm
 POLITELY = ("chrt", "--idle", "0")
 """A calibration takes what the tracker and the recorder leave of the machine, and stops the moment that they wake.
 
@@ -60,6 +62,8 @@ class Request:
     output: Path
     """Folder of the result. It is made, or replaced where it holds an earlier result; nothing else is overwritten."""
     method: str = "default"
+    false_alarm: float = FALSE_ALARM
+    """Probability of a verdict other than `none` where nothing is missing."""
 
     def described(self) -> dict[str, object]:
         """What a result came from, for people and for a second try."""
@@ -69,6 +73,7 @@ class Request:
             "seed": self.seed,
             "rollouts": self.rollouts,
             "method": self.method,
+            "false_alarm": self.false_alarm,
         }
 
 
@@ -86,6 +91,8 @@ def command(request: Request, folder: Path) -> list[str]:
     words = ["--cell", request.cell, "--method", request.method, "--seed", str(request.seed)]
     if request.rollouts:
         words += ["--rollouts", str(request.rollouts)]
+    if request.false_alarm != FALSE_ALARM:
+        words += ["--false-alarm", str(request.false_alarm)]
     typed = shlex.join(["compass", "calibrate", *words, "--out", str(request.output), "--", *request.bags])
     start = [sys.executable, "-m", "compass_ros.cli", "calibrate", "--progress", "json", "--repeat", typed]
     return [*start, *words, "--out", str(folder), "--", *request.bags]

@@ -14,7 +14,7 @@ from compass_ros.discovery.candidates import candidates
 from compass_ros.discovery.first_order import FirstOrder
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.search import Prior, rank, search
-from compass_ros.discovery.threshold import DRAWS, largest_odds, simulated
+from compass_ros.discovery.threshold import BEYOND, largest_odds, simulated
 from compass_ros.pipeline import calibrate
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, Effect, Quantity
@@ -75,11 +75,17 @@ def test_noise_seldom_exceeds_the_threshold(tmp_path: Path) -> None:
     asked = candidates(model.simulator, model.response.values, likelihood.inputs, likelihood.time_s)
     first, prior = rank(FirstOrder(model.response), asked), Prior.of(asked)
     white = Noise(np.ones(likelihood.measured.shape[2]), 0.0)
-    odds = largest_odds(model.response, first, [prior.of_laws([f.candidate.name]) for f in first], white, 0)
-    assert odds.shape == (DRAWS,)
+    priors = [prior.of_laws([f.candidate.name]) for f in first]
+    odds = largest_odds(model.response, first, priors, white, 0.01, 0)
+    assert odds.shape == (100 * BEYOND,)
     assert np.mean(odds > 0) < 0.01
-    again = largest_odds(model.response, first, [prior.of_laws([f.candidate.name]) for f in first], white, 0)
+    again = largest_odds(model.response, first, priors, white, 0.01, 0)
     assert np.array_equal(odds, again)
+    for alpha in (0.3, 0.1, 0.05, 0.02, 0.004):
+        rarer = largest_odds(model.response, first, priors, white, alpha, 0)
+        assert rarer.shape == (round(BEYOND / alpha),)
+        assert np.allclose(rarer[:200], odds[: len(rarer)])
+        assert np.sum(rarer > np.quantile(rarer, 1 - alpha)) == BEYOND
     found = search(model, first, asked, max(float(np.quantile(odds, 0.99)), 0.0), lambda *_: True)
     assert not found.models
     assert found.probabilities[0] > 0.9

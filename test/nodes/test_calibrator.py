@@ -204,7 +204,7 @@ def test_every_parameter_says_what_it_is(start_node: StartNode, probe: Probe) ->
     own = [name for name in listed if name != "use_sim_time" and "start_type_description" not in name]
     assert sorted(own) == [
         "autostart", "bags", "calibrate_at_start", "cell", "data_dir", "false_alarm", "frame", "method", "newest",
-        "output", "resume", "rollouts", "running_check", "seed", "versions",
+        "output", "resume", "rollouts", "running_check", "seed", "verdict_false_alarm", "versions",
     ]  # fmt: skip
     request = DescribeParameters.Request(names=own)
     described = probe.call(DescribeParameters, "/calibrator/describe_parameters", request).descriptors

@@ -6,6 +6,7 @@ import json
 import math
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -129,3 +130,5 @@ def test_command_hands_on_everything_and_the_report_gives_what_a_user_types() ->
     assert command(request, Path("tmp"))[3:] == [*start, *words, "tmp", "--", "a", "b c"]
     budget = Request(bags=("a",), cell="x.yaml", seed=0, rollouts=500, output=Path("out"))
     assert command(budget, Path("tmp"))[-6:] == ["--rollouts", "500", "--out", "tmp", "--", "a"]
+    seldom = replace(budget, rollouts=0, false_alarm=0.001)
+    assert command(seldom, Path("tmp"))[-6:] == ["--false-alarm", "0.001", "--out", "tmp", "--", "a"]
