@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+from dataclasses import replace
 from importlib.metadata import version
 
 import numpy as np
@@ -17,7 +18,7 @@ from compass_ros.discovery.floor import honest
 from compass_ros.posing import Yardstick, noise_floor
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import Recordings, Replay
-from compass_ros.types import Budget, Estimate, Floats, Gap, Graph, ParameterRow, ReplayedTrack, Result
+from compass_ros.types import Budget, Estimate, Floats, Gap, Graph, Mismatch, ParameterRow, ReplayedTrack, Result
 from compass_ros.types import Replay as Drawn
 
 
@@ -75,7 +76,11 @@ def assemble(
         noise_floor_m=floor,
         parameters=rows,
         graph=graph,
-        mismatch=honest(found.mismatch, gap["calibrated"]["held_out" if held_out else "fit"].rmse_m, floor),
+        mismatch=honest(
+            found.mismatch if held_out else _unopened(found.mismatch),
+            gap["calibrated"]["held_out" if held_out else "fit"].rmse_m,
+            floor,
+        ),
         trace=estimate.trace,
         replays=drawn,
         cancelled=estimate.stop_reason.startswith("cancelled"),
@@ -83,6 +88,11 @@ def assemble(
         unit=simulator.unit,
         together=estimate.together,
     )
+
+
+def _unopened(mismatch: Mismatch) -> Mismatch:
+    """Where no episode was held out: without errors that say how well such ones are predicted."""
+    return replace(mismatch, explanations=tuple(replace(one, held_out=None) for one in mismatch.explanations))
 
 
 def versions() -> dict[str, str]:

@@ -74,7 +74,13 @@ WRONG = 3.0
 """Error bars from which a parameter has moved: of 64 right ones, one in six calibrations shows one by chance."""
 
 Channel = Literal["dynamics", "contact", "actuation", "sensing"]
-Phase = Literal["strike", "free", "wall_contact", "object_contact", "all"]
+Phase = Literal["start", "free", "contact", "rest", "all", "strike", "wall_contact", "object_contact"]
+"""start: the command is given; free: something moves and touches nothing; contact; rest. The last three are a table's
+words, and those of the first version of result.json."""
+GENERAL: Mapping[str, Phase] = {"strike": "start", "wall_contact": "contact", "object_contact": "contact"}
+"""Words that a result has for a table's."""
+SiteWord = Literal["joint", "body", "geom_pair", "body_pair", "actuator", "signal"]
+"""A geom pair may be all contacts of a scene, or those of one wall."""
 Verdict = Literal["none", "named", "ambiguous", "unknown", "fit_failed", "data_bad", "not_evaluated"]
 
 
@@ -368,8 +374,12 @@ class EffectFinding:
 
 @dataclass(frozen=True)
 class Region:
+    """A disc in the plane x, y."""
+
     centre_m: tuple[float, float]
     radius_m: float
+    frame: str = "world"
+    """Of the scene: MuJoCo's world, on an air-hockey cell the table's."""
 
 
 DependsOn = Literal["place", "velocity", "time"]
@@ -398,6 +408,10 @@ class Where:
     """Where along the motion most of it sits; None: everywhere."""
     depends_on: DependsOn | None = None
     """What it is a function of, where that is clear; `time`: of neither place nor velocity."""
+    site_kind: SiteWord | None = None
+    """None: sites of several kinds, or a result of the first version."""
+    site: str = "all"
+    """Names with a `+` between them: a joint, a body, two geoms, an actuator, a signal; all: all of them."""
 
 
 @dataclass(frozen=True)
@@ -410,6 +424,25 @@ class ExplainedLaw:
 
 
 @dataclass(frozen=True)
+class HeldOut:
+    """rms distance on episodes that were opened after the verdict."""
+
+    before: float
+    """Of the calibrated simulator without a law."""
+    after: float
+    """With the explanation's laws."""
+    floor: float
+    """What noise alone would leave."""
+    unit: Unit
+
+    @property
+    def removed(self) -> float:
+        """Share of the error above the floor that the laws remove; NaN where there is none."""
+        excess = self.before - self.floor
+        return (self.before - self.after) / excess if excess > 0 else math.nan
+
+
+@dataclass(frozen=True)
 class Explanation:
     """A set of laws, and how probable it is that it is what the simulator lacks."""
 
@@ -417,6 +450,8 @@ class Explanation:
     """Empty: nothing is missing. A law named `unknown`: a discrepancy of no known form."""
     probability: float
     log_evidence: float
+    held_out: HeldOut | None = None
+    """None for a discrepancy of no known form, which predicts nothing, and where no episode was held out."""
 
 
 @dataclass(frozen=True)

@@ -67,6 +67,7 @@ def show(result: Any, answer: Any, marks: Comparison) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from compass_ros.concealed.comparison import general
     from compass_ros.reporting.table import NARROW
 
     console = Console()
@@ -83,7 +84,8 @@ def show(result: Any, answer: Any, marks: Comparison) -> None:
             ("phase", marks.phase_right),
             ("channel", marks.channel_right),
         ):
-            table.add_row(name, str(where.get(name, "-")), " or ".join(effects[0][f"{name}s_right"]), _mark(right))
+            true = dict.fromkeys(map(general, effects[0][f"{name}s_right"]))
+            table.add_row(name, str(where.get(name, "-")), " or ".join(true), _mark(right))
     if marks.centre_error_m is not None:
         x, y = effects[0]["centre_m"]
         table.add_row("centre", f"{1e3 * marks.centre_error_m:.0f} mm away", f"({x:.3f}, {y:.3f}) m")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -21,14 +20,16 @@ from compass_ros.discovery.where import whereabouts
 from compass_ros.discovery.words import DEPENDS, errors, place, value_of, where_of
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import rms_distance
-from compass_ros.simulation.sites import PLANAR
+from compass_ros.simulation.sites import PLANAR, Site, word_of
 from compass_ros.types import (
+    GENERAL,
     EffectFinding,
     EffectParameter,
     Evidence,
     ExplainedLaw,
     Explanation,
     Floats,
+    HeldOut,
     Mismatch,
     Verdict,
     Where,
@@ -64,7 +65,8 @@ class Judge:
         unknown, of_models = self.found.probabilities[1:]
         best = max([self.found.unknown, *self.found.odds], default=-np.inf)
         if best <= self.threshold:
-            return self._none()
+            noise = self._shown()
+            return (self if noise is self.noise else replace(self, noise=noise)).none()
         models = self._explaining(of_models)
         if not models or unknown > 0.5:
             return self._unknown()
@@ -89,15 +91,18 @@ class Judge:
         count = int(np.searchsorted(held, 1 - self.alpha)) + 1
         return [self.found.models[i] for i in order[:count]]
 
-    def _none(self) -> Discovery:
-        noise, unit = self.noise, f"m{self.simulator.unit}"
-        if self._before >= TWICE * self._floor:
-            noise = shown_noise(noise, self.found.plain.likelihood, self.found.plain.fit)
-        floor = rms_distance(self.simulator.cell, noise.rms[None, None])
-        numbers = f"held-out error {1e3 * self._before:.2f} {unit}, noise {1e3 * floor:.2f} {unit}"
-        return replace(
-            self._said("none", f"Nothing is missing that these recordings could show: {numbers}."), noise=noise
-        )
+    def _shown(self) -> Noise:
+        """The noise, with what the fit has shown of it where nothing is missing and yet much is left."""
+        if self._before < TWICE * self._floor:
+            return self.noise
+        return shown_noise(self.noise, self.found.plain.likelihood, self.found.plain.fit)
+
+    def none(self) -> Discovery:
+        """That nothing is missing."""
+        unit = f"m{self.simulator.unit}"
+        numbers = f"held-out error {1e3 * self._before:.2f} {unit}, noise {1e3 * self._floor:.2f} {unit}"
+        sentence = f"Nothing is missing that these recordings could show: {numbers}."
+        return replace(self._said("none", sentence), noise=self.noise)
 
     def _unknown(self) -> Discovery:
         unit = f"m{self.simulator.unit}"
@@ -109,11 +114,18 @@ class Judge:
             best = self.found.models[0].name
             sentence += f" (probability {unknown:.2f}; the best law, {best}, has {of_models[0]:.2g})"
         before = f"held-out error {1e3 * self._before:.2f} {unit}, floor {1e3 * self._floor:.2f} {unit}"
-        return self._said("unknown", f"{sentence}; {before}.", where)
+        return self._said("unknown", f"{sentence}; {before}.", self._of_discrepancy(where))
+
+    def _of_discrepancy(self, where: Where) -> Where:
+        """With the site of a discrepancy that no law explains."""
+        if where.channel == "sensing":
+            return _on(where, self.simulator.places.signals, ())
+        sites = [s for s in self.found.plain.response.sites if where.object in ("all", s.name)]
+        return _on(where, sites, [sites[0].name] if len(sites) == 1 else ())
 
     def _named(self, models: Sequence[Hypothesis], verdict: Verdict) -> Discovery:
         best, values = models[0], models[0].fit.point.values
-        after = held_out_error(self.simulator.cell, best.likelihood.on(self.held_out), values)
+        after = self._after(best)
         evidence = self._evidence(best, after)
         others = dict.fromkeys(a.effect.name for m in models[1:] for a in m.laws)
         findings = tuple(
@@ -133,7 +145,8 @@ class Judge:
         )
         said = errors(self._before, after, self._floor, self.simulator.unit)
         sentence = f"{place(where, self._flat)}, the simulator lacks {lacks}; {sizes}; {said}."
-        return self._said(verdict, sentence, where, findings, following, best)
+        sites = self.simulator.places.sites(best.laws[0].objects, best.laws[0].effect.on)
+        return self._said(verdict, sentence, _on(where, sites, best.laws[0].objects), findings, following, best)
 
     def _said(
         self,
@@ -147,7 +160,7 @@ class Judge:
         mismatch = Mismatch(
             verdict, where, findings, self.undetectable, following, sentence, self._explanations(), self.alpha
         )
-        tried = self._tried(best, findings[0].evidence.held_out_gain if findings else math.nan)
+        tried = self._tried(best)
         plain, cell = self.found.plain, len(self.simulator.cell.parameters)
         before = table_map(plain.response, plain.free.pushes)
         if best is None:
@@ -159,38 +172,50 @@ class Judge:
         )
 
     def _explanations(self) -> tuple[Explanation, ...]:
+        """The most probable ones; held-out episodes are opened for each of them, now that the verdict stands."""
         none, unknown, of_models = self.found.probabilities
-        plain = self.found.plain.log_evidence
+        plain = self.found.plain
         rows = [
-            Explanation((), none, plain),
-            Explanation((ExplainedLaw(UNKNOWN, (), {}),), unknown, plain + self.found.unknown),
+            Explanation((), none, plain.log_evidence, self._held_out(self._before)),
+            Explanation((ExplainedLaw(UNKNOWN, (), {}),), unknown, plain.free.log),
             *(
-                Explanation(_explained(m), float(p), m.log_evidence)
+                Explanation(_explained(m), float(p), m.log_evidence, self._held_out(self._after(m)))
                 for m, p in list(zip(self.found.models, of_models, strict=True))[:SAID]
             ),
         ]
         return tuple(sorted(rows, key=lambda e: -e.probability))[:SAID]
 
-    def _tried(self, best: Hypothesis | None, gain: float) -> tuple[Tried, ...]:
-        """The most probable models. Held-out episodes are opened for the one that is said, and for no other."""
+    def _held_out(self, after: float) -> HeldOut:
+        return HeldOut(self._before, after, self._floor, self.simulator.unit)
+
+    def _tried(self, best: Hypothesis | None) -> tuple[Tried, ...]:
+        """The most probable models."""
         rows = list(zip(self.found.models, self.found.odds, self.found.probabilities[2], strict=True))[:SAID]
         return tuple(
-            Tried(
-                m.name,
-                m.laws[0].effect.channel,
-                odds,
-                gain if m is best else math.nan,
-                m is best,
-                f"probability {p:.3g}",
-            )
+            Tried(m.name, m.laws[0].effect.channel, odds, self._gain(self._after(m)), m is best, f"probability {p:.3g}")
             for m, odds, p in rows
         )
 
     def _evidence(self, model: Hypothesis, after: float) -> Evidence:
         odds = self.found.odds[self.found.models.index(model)]
-        gain = float(np.clip((self._before - after) / max(self._before - self._floor, 1e-9), -1.0, 1.0))
         alarms = float((1 + np.sum(self.odds >= odds)) / (1 + len(self.odds)))
-        return Evidence(gain, odds, alarms)
+        return Evidence(self._gain(after), odds, alarms)
+
+    def _gain(self, after: float) -> float:
+        """Share of the excess held-out error that a model removes."""
+        return float(np.clip((self._before - after) / max(self._before - self._floor, 1e-9), -1.0, 1.0))
+
+    def _after(self, model: Hypothesis) -> float:
+        """Held-out error of the simulator with a model's laws."""
+        if model.name not in self._errors:
+            judged, values = model.likelihood.on(self.held_out), model.fit.point.values
+            self._errors[model.name] = held_out_error(self.simulator.cell, judged, values)
+        return self._errors[model.name]
+
+    @cached_property
+    def _errors(self) -> dict[str, float]:
+        """Held-out errors that are known by now, by name of the model."""
+        return {}
 
     @cached_property
     def _before(self) -> float:
@@ -206,6 +231,14 @@ class Judge:
     @property
     def _floor(self) -> float:
         return rms_distance(self.simulator.cell, self.noise.rms[None, None])
+
+
+def _on(where: Where, sites: Sequence[Site], names: Sequence[str]) -> Where:
+    """With its sites, in a result's words; without names: all of these sites."""
+    kinds = {word_of(site.kind) for site in sites}
+    kind = kinds.pop() if len(kinds) == 1 else None
+    phase = GENERAL.get(where.phase, where.phase)
+    return replace(where, phase=phase, site_kind=kind, site="+".join(names) or "all")
 
 
 def _explained(model: Hypothesis) -> tuple[ExplainedLaw, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from compass_ros.reporting.words import MODELS
 from compass_ros.types import (
+    GENERAL,
     Budget,
     EffectFinding,
     EffectParameter,
@@ -18,6 +19,7 @@ from compass_ros.types import (
     Explanation,
     Gap,
     Graph,
+    HeldOut,
     Interval,
     LeftOut,
     Mismatch,
@@ -35,7 +37,10 @@ Json = Mapping[str, Any]
 
 
 def from_json(content: Json) -> Result:
-    """The inverse of `to_json`, with NaN for null; replays and trace, which are not in the file, are empty."""
+    """The inverse of `to_json`, with NaN for null; replays and trace, which are not in the file, are empty.
+
+    Results of the first version are read too: what they lack is None or empty, their phases have the words of today.
+    """
     gap, graph, budget = content["gap"], content["graph"], content["budget"]
     return Result(
         cell=content["cell"],
@@ -113,10 +118,13 @@ def _mismatch(said: Json) -> Mismatch:
 
 
 def _explanation(said: Json) -> Explanation:
-    laws = tuple(
-        ExplainedLaw(law["name"], tuple(law["sites"]), _quantities(law["quantities"])) for law in said["laws"]
-    )
-    return Explanation(laws, said["probability"], _number(said["log_evidence"]))
+    laws = tuple(ExplainedLaw(law["name"], tuple(law["sites"]), _quantities(law["quantities"])) for law in said["laws"])
+    held_out = _held_out(said["held_out"]) if said.get("held_out") is not None else None
+    return Explanation(laws, said["probability"], _number(said["log_evidence"]), held_out)
+
+
+def _held_out(said: Json) -> HeldOut:
+    return HeldOut(_number(said["before"]), _number(said["after"]), _number(said["floor"]), said["unit"])
 
 
 def _quantities(said: Json) -> dict[str, EffectParameter]:
@@ -127,13 +135,20 @@ def _where(where: Json) -> Where:
     region, time_s, interval = where["region"], where["time_s"], where.get("interval")
     return Where(
         where["object"],
-        where["phase"],
+        GENERAL.get(where["phase"], where["phase"]),
         where["channel"],
-        None if region is None else Region((region["centre_m"][0], region["centre_m"][1]), region["radius_m"]),
+        None if region is None else _region(region),
         None if time_s is None else (time_s[0], time_s[1]),
         None if interval is None else Interval(**interval),
         where.get("depends_on"),
+        where.get("site_kind"),
+        where.get("site", where["object"]),
     )
+
+
+def _region(region: Json) -> Region:
+    x, y = region["centre_m"]
+    return Region((x, y), region["radius_m"], region.get("frame", "world"))
 
 
 def _effect(effect: Json) -> EffectFinding:

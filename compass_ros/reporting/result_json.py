@@ -21,13 +21,15 @@ from compass_ros.types import (
     Explanation,
     Gap,
     Graph,
+    HeldOut,
     Mismatch,
     ParameterRow,
+    Region,
     Result,
     Where,
 )
 
-SCHEMA_ID = "compass/result/1"
+SCHEMA_ID = "compass/result/2"
 
 
 @cache
@@ -89,15 +91,22 @@ def _where(where: Where | None) -> dict[str, Any] | None:
     region = where.region
     return {
         "object": where.object,
+        "site_kind": where.site_kind,
+        "site": where.site,
         "phase": where.phase,
         "channel": where.channel,
-        "region": None
-        if region is None
-        else {"centre_m": [float(c) for c in region.centre_m], "radius_m": float(region.radius_m)},
+        "region": None if region is None else _region(region),
         "time_s": None if where.time_s is None else [float(t) for t in where.time_s],
         "interval": None if where.interval is None else asdict(where.interval),
         "depends_on": where.depends_on,
     }
+
+
+def _region(region: Region) -> dict[str, Any]:
+    """A disc is `centre_m`, `radius_m`; the box around it says the same for places of any kind."""
+    centre, radius = [float(c) for c in region.centre_m], float(region.radius_m)
+    box = {"frame": region.frame, "centre": centre, "half_extent": [radius] * len(centre)}
+    return box | {"centre_m": centre, "radius_m": radius}
 
 
 def _effect(effect: EffectFinding) -> dict[str, Any]:
@@ -125,7 +134,13 @@ def _explanation(explanation: Explanation) -> dict[str, Any]:
         ],
         "probability": float(explanation.probability),
         "log_evidence": _number(explanation.log_evidence),
+        "held_out": None if explanation.held_out is None else _held_out(explanation.held_out),
     }
+
+
+def _held_out(errors: HeldOut) -> dict[str, Any]:
+    numbers = {name: _number(getattr(errors, name)) for name in ("before", "after", "floor")}
+    return numbers | {"unit": errors.unit}
 
 
 def _mismatch(mismatch: Mismatch) -> dict[str, Any]:
@@ -167,6 +182,7 @@ def to_json(result: Result) -> dict[str, Any]:
             "wall_seconds": _number(result.budget.wall_seconds),
         },
         "episodes": {
+            "used": list(result.fit),
             "fit": list(result.fit),
             "held_out": list(result.held_out),
             "left_out": [{"bag": one.bag, "reason": one.reason} for one in result.left_out],

@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 
 from compass_ros.errors import nearest
+from compass_ros.types import SiteWord
 
 SiteKind = Literal[
     "hinge",
@@ -275,6 +276,19 @@ def drive_kind(model: mujoco.MjModel, actuator: int) -> SiteKind:
         return "velocity_drive"
     by_force = plain or (affine and stiffness == 0 and damping == 0)
     return "effort_drive" if fixed and by_force and followed else "other_drive"
+
+
+def word_of(kind: SiteKind) -> SiteWord:
+    """What a result calls it."""
+    if kind in JOINTS:
+        return "joint"
+    if kind in MOVING:
+        return "body"
+    if kind in DRIVES:
+        return "actuator"
+    if kind in SIGNALS:
+        return "signal"
+    return "body_pair" if kind == "body_pair" else "geom_pair"
 
 
 def in_words(kinds: Collection[SiteKind]) -> str:

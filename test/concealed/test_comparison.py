@@ -83,6 +83,24 @@ def test_a_right_name_and_its_numbers() -> None:
     assert marks.ordinary_z == pytest.approx(2.0)
 
 
+@pytest.mark.parametrize(
+    ("said", "true", "right"),
+    [
+        ("start", "strike", True),
+        ("strike", "strike", True),
+        ("contact", "wall_contact", True),
+        ("contact", "object_contact", True),
+        ("wall_contact", "contact", True),
+        ("free", "strike", False),
+        ("contact", "free", False),
+    ],
+)
+def test_phases_of_a_table_are_general_ones(said: str, true: str, right: bool) -> None:
+    """Answers that were sealed before have a table's words, results of today the general ones."""
+    found = result("named", fitted("fan_field"), where=WHERE | {"phase": said})
+    assert compare(found, answer("one", EFFECT | {"phases_right": [true]})).phase_right is right
+
+
 def test_what_the_parameters_leave_of_all_episodes() -> None:
     """Fitted: 3 mm over a noise of 1 mm in one; held out: 5 mm over 1 mm in two."""
     found, truth = result("none"), answer("one", EFFECT)

@@ -49,10 +49,29 @@ def test_a_law_on_a_servo_is_named_with_its_size(tmp_path: Path, law: str, numbe
         unit = force if found.unit.startswith("N") else 1.0
         assert found.value / unit == pytest.approx(planted, rel=0.05), name
         assert abs(found.value) > 2 * found.std
+    assert mismatch.where is not None
+    at = ("joint", "axis", "free") if effect(law).moves else ("actuator", "all", "start")
+    assert (mismatch.where.site_kind, mismatch.where.site, mismatch.where.phase) == at
+    opened(mismatch)
+    errors = mismatch.explanations[0].held_out
+    assert errors is not None
+    assert errors.removed == pytest.approx(1.0, abs=0.1)
+
+
+def opened(mismatch: Mismatch) -> None:
+    """Each explanation with a simulator has its error on the held-out episodes; that of nothing has no other."""
+    for one in mismatch.explanations:
+        names = [law.name for law in one.laws]
+        assert (one.held_out is None) is (names == ["unknown"])
+        if one.held_out is not None:
+            assert (one.held_out.after == one.held_out.before) is (not names)
+            assert one.held_out.floor > 0
 
 
 def test_nothing_is_missing_from_a_servo_that_has_wrong_numbers(tmp_path: Path) -> None:
-    assert said(tmp_path, [], []).verdict == "none"
+    mismatch = said(tmp_path, [], [])
+    assert (mismatch.verdict, mismatch.explanations[0].laws) == ("none", ())
+    opened(mismatch)
 
 
 def test_two_laws_on_a_servo_are_both_named(tmp_path: Path) -> None:

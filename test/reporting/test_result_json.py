@@ -15,24 +15,31 @@ import pytest
 from compass_ros.errors import ConfigError
 from compass_ros.reporting.from_json import from_json
 from compass_ros.reporting.result_json import read_result, schema, to_json, write_result
-from compass_ros.types import EffectParameter, ExplainedLaw, Explanation, Gap, Graph, Result, Verdict
+from compass_ros.types import EffectParameter, ExplainedLaw, Explanation, Gap, Graph, HeldOut, Result, Verdict
 
 CONTRACT = {
     "": ("schema", "cell", "seed", "versions", "budget", "episodes", "gap", "parameters", "graph", "mismatch"),
     "budget": ("rollouts", "simulated_seconds", "wall_seconds"),
-    "episodes": ("fit", "held_out"),
+    "episodes": ("used", "fit", "held_out"),
     "gap": ("nominal", "calibrated", "with_effects", "noise_floor_m"),
     "gap.nominal": ("fit", "held_out"),
     "gap.nominal.fit": ("d", "rmse_m"),
     "parameters.0": ("name", "unit", "default", "value", "std", "bounds", "active", "identifiable"),
     "graph": ("parameters", "factors", "psi", "threshold", "sparsity"),
-    "mismatch": ("verdict", "where", "effects", "undetectable", "next_experiment", "sentence"),
-    "mismatch.where": ("object", "phase", "channel", "region", "time_s"),
-    "mismatch.where.region": ("centre_m", "radius_m"),
+    "mismatch": (
+        "verdict", "where", "effects", "undetectable", "next_experiment", "sentence", "explanations", "false_alarm",
+    ),
+    "mismatch.where": (
+        "object", "site_kind", "site", "phase", "channel", "region", "time_s", "interval", "depends_on",
+    ),
+    "mismatch.where.region": ("centre_m", "radius_m", "frame", "centre", "half_extent"),
+    "mismatch.explanations.0": ("laws", "probability", "log_evidence", "held_out"),
+    "mismatch.explanations.0.laws.0": ("name", "sites", "quantities"),
+    "mismatch.explanations.0.held_out": ("before", "after", "floor", "unit"),
     "mismatch.effects.0": ("name", "parameters", "evidence", "equivalents"),
     "mismatch.effects.0.parameters.strength": ("value", "std", "unit"),
     "mismatch.effects.0.evidence": ("held_out_gain", "log_evidence", "false_alarm_p"),
-}
+}  # fmt: skip
 """The fields that the design names, by the path of the object that holds them."""
 
 
@@ -54,7 +61,7 @@ def test_schema_is_a_schema() -> None:
 def test_every_verdict_fits_the_schema(verdict: Verdict, make_result: Callable[[Verdict], Result]) -> None:
     content = to_json(make_result(verdict))
     jsonschema.Draft202012Validator(schema()).validate(content)
-    assert content["schema"] == "compass/result/1"
+    assert content["schema"] == "compass/result/2"
     assert content["mismatch"]["verdict"] == verdict
 
 
@@ -68,10 +75,14 @@ def test_no_field_of_the_contract_may_miss(path: str, field: str, result: Result
 @pytest.mark.parametrize(
     ("path", "field", "wrong"),
     [
-        ("", "schema", "compass/result/2"),
+        ("", "schema", "compass/result/3"),
         ("", "seed", 1.5),
         ("mismatch", "verdict", "perhaps"),
         ("mismatch.where", "phase", "flying"),
+        ("mismatch.where", "phase", "strike"),
+        ("mismatch.where", "site_kind", "hinge"),
+        ("mismatch.explanations.0", "probability", 1.1),
+        ("mismatch.explanations.0.held_out", "unit", "mm"),
         ("mismatch.where", "channel", "magic"),
         ("parameters.0", "bounds", [0.0]),
         ("graph", "sparsity", 1.2),
@@ -159,8 +170,8 @@ def test_what_is_not_finite_or_not_there_is_null(result: Result) -> None:
     [
         ("", "not valid JSON"),
         ('{"schema": "compass/result/1"', "not valid JSON"),
-        ("[1, 2]", "not a compass/result/1"),
-        ('{"schema": "other/1"}', "not a compass/result/1"),
+        ("[1, 2]", "not a compass/result/2"),
+        ('{"schema": "other/1"}', "not a compass/result/2"),
         ("[" * 100_000, "not valid JSON"),
     ],
 )
@@ -214,7 +225,13 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, result: Result) -> N
 def test_explanations_read_back(make_result: Callable[[Verdict], Result]) -> None:
     law = ExplainedLaw("coulomb_friction", ("elbow",), {"coefficient": EffectParameter(0.3, 0.01, "N m")})
     unknown = ExplainedLaw("unknown", (), {})
-    explained = (Explanation((law,), 0.9, -12.5), Explanation((unknown,), 0.08, -15.0), Explanation((), 0.02, -18.0))
+    errors = HeldOut(0.030, 0.011, 0.002, "rad")
+    explained = (
+        Explanation((law,), 0.9, -12.5, errors),
+        Explanation((unknown,), 0.08, -15.0),
+        Explanation((), 0.02, -18.0, HeldOut(0.030, 0.030, 0.002, "rad")),
+    )
+    assert errors.removed == pytest.approx(19 / 28)
     result = make_result("named")
     result = replace(result, mismatch=replace(result.mismatch, explanations=explained, false_alarm=0.01))
     content = json.loads(json.dumps(to_json(result)))
