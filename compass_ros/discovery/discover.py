@@ -12,7 +12,7 @@ from compass_ros.discovery.finding import Discovery, fit_failed, not_evaluated
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.numerics import numerics_as_model
-from compass_ros.discovery.objections import objections
+from compass_ros.discovery.objections import frame_rate, objections
 from compass_ros.discovery.search import Prior, Tell, rank, search
 from compass_ros.discovery.threshold import largest_odds
 from compass_ros.discovery.verdict import Judge
@@ -41,7 +41,7 @@ def discover(
     if lacking := _lacking(simulator, len(likelihood.inputs)):
         return not_evaluated(lacking)
     try:
-        rate_hz = 1 / float(np.median(np.diff(likelihood.time_s, axis=1)))
+        rate_hz = frame_rate(likelihood.time_s)
         warnings = objections(simulator.cell, likelihood.inputs, rate_hz, simulator.places.touching)
     except DataError as error:
         return Discovery(Mismatch("data_bad", None, (), (), "", f"These recordings cannot answer: {error}."))

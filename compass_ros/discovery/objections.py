@@ -14,6 +14,12 @@ SAME, ALIKE = 0.01, 0.05
 """Distance of two commands, in parts of what the robot can do: the same shot again; hardly another one."""
 
 
+def frame_rate(time_s: Floats) -> float:
+    """Frames a second, as is usual in (E, F) times [s]; 0 where none has two. Short ones repeat their last time."""
+    steps = np.diff(time_s, axis=1)
+    return 1 / float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+
+
 def objections(cell: Cell, inputs: Floats, rate_hz: float, touching: bool = True) -> tuple[str, ...]:
     """What speaks against (E, A) shots recorded at a rate, as warnings. Raises DataError where they cannot answer.
 

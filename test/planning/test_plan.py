@@ -7,7 +7,7 @@ import pytest
 
 from compass_ros.cells import load
 from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.objections import objections
+from compass_ros.discovery.objections import frame_rate, objections
 from compass_ros.errors import DataError
 from compass_ros.planning.information import Information, information
 from compass_ros.planning.plan import Visible, label, plan_of
@@ -131,6 +131,19 @@ def test_a_good_set_meets_no_objection() -> None:
 def test_what_cannot_answer_is_refused(given: Floats, rate: float, words: str) -> None:
     with pytest.raises(DataError, match=words):
         objections(cell(), given, rate)
+
+
+@pytest.mark.parametrize(
+    ("frames", "rate"),
+    [([40], 60.0), ([40, 40, 40], 60.0), ([100, 20, 20, 20], 100.0), ([1000, 50, 60, 70], 500.0), ([3, 1, 1, 1], 15.0)],
+)
+def test_the_rate_is_that_of_frames_and_not_of_what_fills_short_episodes(frames: list[int], rate: float) -> None:
+    rows = [np.pad(np.arange(n) / rate, (0, max(frames) - n), mode="edge") for n in frames]
+    assert frame_rate(np.stack(rows)) == pytest.approx(rate)
+
+
+def test_episodes_of_one_frame_have_no_rate() -> None:
+    assert frame_rate(np.zeros((3, 1))) == 0.0
 
 
 @pytest.mark.parametrize("rate", [5.0, 10.0, 15.0, 24.0, 27.0])
