@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -15,6 +16,8 @@ from compass_ros.reporting.extras import ReportExtras, ResidualMap
 from compass_ros.reporting.numbers import MINUS, percent, plain, probability, unit_text, value_pm, with_unit
 from compass_ros.reporting.residuals import error_curves, left_over
 from compass_ros.reporting.table import STYLE, gap_table, parameter_table
+from compass_ros.reporting.view.explanations import ranked
+from compass_ros.reporting.view.gap import signals
 from compass_ros.reporting.view.missing import ranking
 from compass_ros.reporting.words import (
     MODEL_LABEL,
@@ -27,6 +30,8 @@ from compass_ros.reporting.words import (
 from compass_ros.types import EffectFinding, Floats, Result
 
 BARS = "▁▂▃▄▅▆▇█"
+FULL, WIDTH = BARS[-1], 10
+"""Of a bar that lies, and how long it is at a probability of 1."""
 SHADES = "·░▒▓█"
 MARK: dict[Level, str] = {"good": "+", "note": "-", "care": "!", "bad": "x"}
 
@@ -44,8 +49,13 @@ def print_diagnosis(result: Result, extras: ReportExtras, console: Console | Non
     for finding in result.mismatch.effects:
         out.print(_effect(finding))
         out.print(Text(f"{finding.name} {_evidence(finding)}"))
-    if extras.candidates:
+    if result.mismatch.explanations:
+        out.print(_explanations(result))
+    elif extras.candidates:
         out.print(_candidates(result, extras))
+    by_signal = signals(result)
+    if by_signal["rows"]:
+        out.print(_signals(by_signal))
     for line in (*_curves(result), *_map(left_over(result, extras))):
         out.print(line, no_wrap=True, overflow="crop")
     checks = assess(result)
@@ -72,6 +82,28 @@ def _effect(finding: EffectFinding) -> Table:
     table = Table("parameter", "value", "unit", title=Text(finding.name, "bold"), title_justify="left")
     for name, p in finding.parameters.items():
         table.add_row(Text(name), Text(value_pm(p.value, p.std)), Text(unit_text(p.unit)))
+    return table
+
+
+def _explanations(result: Result) -> Table:
+    table = Table(
+        Column("explanation", overflow="fold"), Column("probability", no_wrap=True), Column("removes", justify="right"),
+        Column("held-out error", no_wrap=True), "", title="What could explain it", title_justify="left",
+    )  # fmt: skip
+    for row in ranked(result.mismatch):
+        style = "bold" if row.kept else "dim"
+        bar = FULL * round(row.share / 100 * WIDTH)
+        cells = (row.name, f"{bar:{WIDTH}} {row.probability}", row.removes, row.errors, row.why)
+        table.add_row(*(Text(cell, style) for cell in cells))
+    return table
+
+
+def _signals(by_signal: Mapping[str, Any]) -> Table:
+    columns = [Column(heading, justify="right") for heading in (*MODEL_LABEL.values(), "floor")]
+    table = Table("signal", *columns, "unit", title=f"Error by signal, {by_signal['on']}", title_justify="left")
+    for row in by_signal["rows"]:
+        name = f"  {row['name']}" if row["part"] else row["name"]
+        table.add_row(*map(Text, (name, *row["numbers"], row["floor"], unit_text(row["unit"]))))
     return table
 
 

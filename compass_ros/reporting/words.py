@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from compass_ros.reporting.numbers import MINUS, with_unit
-from compass_ros.types import DependsOn, ParameterRow, Phase, Result, Told, Unit, Verdict, Where
+from compass_ros.types import DependsOn, ParameterRow, Phase, Result, SiteWord, Told, Unit, Verdict, Where
 
 Level = Literal["good", "note", "care", "bad"]
 Model = Literal["nominal", "calibrated", "with_effects"]
@@ -51,6 +51,9 @@ VERDICT_MEANING: Mapping[Verdict, str] = {
 }
 
 PHASE: Mapping[Phase, str] = {
+    "start": "at the strike",
+    "contact": "in contacts",
+    "rest": "at rest",
     "strike": "at the strike",
     "free": "on free slides",
     "wall_contact": "at wall contacts",
@@ -64,8 +67,18 @@ KIND: Mapping[DependsOn, str] = {
     "time": "neither a function of place nor of velocity",
 }
 
-OF_JOINTS: Mapping[Phase, str] = {**PHASE, "strike": "in the drive", "free": "in motion"}
+OF_JOINTS: Mapping[Phase, str] = {**PHASE, "start": "in the drive", "strike": "in the drive", "free": "in motion"}
 """The same where hinges are tracked and nothing else."""
+
+SITES: Mapping[SiteWord, tuple[str, str]] = {
+    "joint": ("joint", "joints"),
+    "body": ("body", "bodies"),
+    "geom_pair": ("contacts of", "contacts"),
+    "body_pair": ("pair of", "pairs of bodies"),
+    "actuator": ("actuator", "actuators"),
+    "signal": ("signal", "signals"),
+}
+"""One of them before its name, and several."""
 
 CHANNEL: Mapping[str, str] = {
     "dynamics": "dynamics: a force while moving",
@@ -118,6 +131,8 @@ def where_rows(where: Where, unit: Unit) -> tuple[tuple[str, str], ...]:
     hinges = unit == "rad"
     every = "all joints" if hinges else "all objects"
     rows = [("object", every if where.object == "all" else where.object)]
+    if where.site_kind is not None:
+        rows = [("site", _site(where.site, *SITES[where.site_kind], pair=where.site_kind.endswith("pair")))]
     rows.append(("phase", (OF_JOINTS if hinges else PHASE)[where.phase]))
     rows.append(("channel", CHANNEL[where.channel]))
     if where.region is not None:
@@ -133,6 +148,14 @@ def where_rows(where: Where, unit: Unit) -> tuple[tuple[str, str], ...]:
     if where.time_s is not None:
         rows.append(("time", f"{where.time_s[0]:.2f} to {where.time_s[1]:.2f} s after the command"))
     return tuple(rows)
+
+
+def _site(site: str, one: str, several: str, pair: bool) -> str:
+    """`joint elbow`, `joints elbow, wrist`, `all joints`."""
+    if site == "all":
+        return f"all {several}"
+    names = site.split("+")
+    return f"{one if pair or len(names) == 1 else several} {' and '.join(names) if pair else ', '.join(names)}"
 
 
 def by_kind(names: Sequence[str]) -> str:

@@ -31,6 +31,7 @@ from compass_ros.types import (
     Replay,
     ReplayedTrack,
     Result,
+    SignalGap,
     Verdict,
     Where,
 )
@@ -163,7 +164,11 @@ def _gap(shots: tuple[Replay, ...], model: str) -> Gap:
     errors = {f: [np.linalg.norm(m - r, axis=1) for r, m, name in pairs if name == f] for f in FACTORS}
     every = np.concatenate([e for part in errors.values() for e in part])
     d = {factor: float(np.mean([e.sum() / 3 for e in part])) for factor, part in errors.items()}
-    return Gap(d, float(np.sqrt(np.mean(every**2))))
+    rms = {factor: float(np.sqrt(np.mean(np.concatenate(part) ** 2))) for factor, part in errors.items()}
+    signals = {factor: SignalGap(one, "m", 0.00101) for factor, one in rms.items()}
+    turning = {f"{factor}_spin": one / 0.0255 for factor, one in rms.items()}
+    signals["spins"] = SignalGap(float(np.sqrt(np.mean(np.square([*turning.values()])))), "rad", 0.04, turning)
+    return Gap(d, float(np.sqrt(np.mean(every**2))), signals)
 
 
 def _trace(
@@ -198,7 +203,7 @@ def explanation(name: str, probability: float, log_evidence: float, after: float
     return Explanation(laws, probability, log_evidence, HeldOut(0.0196, after, 0.00101, "m"))
 
 
-UNKNOWN = Explanation((ExplainedLaw("unknown", (), {}),), 0.002, 7_903.0)
+UNKNOWN = Explanation((ExplainedLaw("unknown", (), {}),), 0.002, 7_917.9)
 NOTHING = Explanation((), 1e-130, 7_611.0, HeldOut(0.0196, 0.0196, 0.00101, "m"))
 EXPLANATIONS: dict[Verdict, tuple[Explanation, ...]] = {
     "none": (replace(NOTHING, probability=0.98), replace(UNKNOWN, probability=0.02, log_evidence=7_607.0)),

@@ -85,8 +85,15 @@ def test_says_what_it_must(outline: Outline, result: Result, extras: ReportExtra
     assert "0.8463 ± 0.0031" in said
     assert "54 further parameters" in said
     assert "within 12 cm of (0.020, −0.010) m" in said  # the sign that readers see
-    for name in (*result.mismatch.undetectable, *(c.name for c in extras.candidates), *result.versions):
+    laws = [law.name for one in result.mismatch.explanations for law in one.laws if law.name != "unknown"]
+    for name in (*result.mismatch.undetectable, *laws, *result.versions):
         assert name in said
+
+
+def test_a_result_without_explanations_shows_the_candidates(result: Result, extras: ReportExtras) -> None:
+    old = replace(result, mismatch=replace(result.mismatch, explanations=()))
+    said = Outline(render(old, extras)).said()
+    assert all(candidate.name in said for candidate in extras.candidates)
 
 
 def test_every_parameter_is_in_the_heat_map(outline: Outline, result: Result) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from compass_ros.reporting.drawing import MAX_REPLAYS, chosen, episode_rmse
 from compass_ros.reporting.numbers import plain, thousandths
-from compass_ros.reporting.words import MODEL_LABEL, MODELS, best_model, fit_rmse, held_out_rmse
-from compass_ros.types import Result
+from compass_ros.reporting.words import MODEL_LABEL, MODELS, Model, best_model, fit_rmse, held_out_rmse
+from compass_ros.types import Gap, Result
 
 TIMES = "\N{MULTIPLICATION SIGN}"
 
@@ -74,6 +74,49 @@ def factor_table(result: Result) -> list[dict[str, Any]]:
                 cells.append(plain(gap.d.get(factor, math.nan), 3) if gap is not None else plain(math.nan))
         rows.append({"factor": factor, "cells": cells})
     return rows
+
+
+def signals(result: Result) -> dict[str, Any]:
+    """Error of each signal, and of each joint of it, in floors on one logarithmic line: before and after.
+
+    On held-out episodes where there are any, else on the fitted ones; without rows where no signal is told apart.
+    """
+    of_models = {m: parts["held_out"] if "held_out" in parts else parts["fit"] for m, parts in result.gap.items()}
+    found = _signals(of_models)
+    errors = {(s, part, m): _error(gap, s, part) for m, gap in of_models.items() for s, part, _ in found}
+    scale = LogScale([1.0, *(errors[s, part, m] / floor for s, part, floor in found for m in of_models)])
+    rows = [
+        {
+            "name": part or s,
+            "part": bool(part),
+            "unit": of_models["nominal"].signals[s].unit,
+            "dots": [
+                {"key": m, "place": place}
+                for m in MODELS
+                if m in of_models and (place := scale.place(errors[s, part, m] / floor)) is not None
+            ],
+            "numbers": [plain(errors.get((s, part, m), math.nan), 3) for m in MODELS],
+            "floor": plain(floor, 3),
+        }
+        for s, part, floor in found
+    ]
+    unseen = all("held_out" in parts for parts in result.gap.values())
+    on = "episodes that were never fitted" if unseen else "the fitted episodes"
+    return {"rows": rows if len(rows) > 1 else [], "floor": scale.place(1.0), "on": on}
+
+
+def _signals(of_models: Mapping[Model, Gap]) -> list[tuple[str, str, float]]:
+    """Signal, joint or nothing, noise floor; the joints of a signal after it."""
+    nominal = of_models["nominal"].signals if "nominal" in of_models else {}
+    floors = {name: one.floor if one.floor > 0 else math.nan for name, one in nominal.items()}
+    return [(name, part, floors[name]) for name, one in nominal.items() for part in ("", *one.parts)]
+
+
+def _error(gap: Gap, signal: str, part: str) -> float:
+    one = gap.signals.get(signal)
+    if one is None:
+        return math.nan
+    return one.parts.get(part, math.nan) if part else one.rms
 
 
 def episodes(result: Result) -> dict[str, Any]:
