@@ -1,7 +1,8 @@
-"""The discrepancy: a Gaussian process over generalised forces and over signals, for itself in each episode.
+"""The discrepancy: a Gaussian process over generalised forces and over signals, in time or over the state.
 
 delta_s(t) ~ GP(0, size_s^2 exp(-(t - t')^2 / (2 MEMORY_S^2))): an acceleration in each direction s of what is tracked,
-or an error of each signal s.
+or an error of each signal s, another one in each episode; or an acceleration that is one function of place and velocity
+in all of them (`kernels.py`).
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compass_ros.discovery.evidence import evidences, log_sum
+from compass_ros.discovery.kernels import features_of, of_sizes, shared
 from compass_ros.discovery.response import Response
 from compass_ros.discovery.settings import FREE, MEMORY_S, RHO, RHO_PRIOR
 from compass_ros.types import Floats
@@ -45,17 +47,22 @@ class Free:
     """Of the same with a free discrepancy, of forces or of signals."""
     of_forces: bool
     """Which of the two has the higher evidence."""
+    in_time: float
+    """Of the same with one of forces in time."""
     pushes: Floats
-    """(E, K, S) posterior mean of the most probable one of forces."""
+    """(E, K, S) posterior mean of that, of the most probable size."""
 
 
 def free(response: Response) -> Free:
-    """The model of a response with a discrepancy of any size, of forces or of signals."""
+    """The model of a response with a discrepancy of any size: of forces or of signals in time, or of the state."""
     alone, *found = evidences(response.tangent, [None, *(spread(response, size) for size in free_sizes(response))])
     logs = np.array([f.log for f in found])
-    best, moments = int(np.argmax(logs)), len(response.kicks.moments_s)
-    pushes = found[int(np.argmax(logs[: len(FREE)]))].pushes.reshape(-1, moments, len(response.unit))
-    return Free(alone.log, log_sum(logs - np.log(len(logs))), best < len(FREE), pushes)
+    forces, signals = (log_sum(part) - np.log(len(FREE)) for part in (logs[: len(FREE)], logs[len(FREE) :]))
+    state = shared(response, "state").log
+    best, moments = int(np.argmax(logs[: len(FREE)])), len(response.kicks.moments_s)
+    pushes = found[best].pushes.reshape(-1, moments, len(response.unit))
+    log = log_sum(np.array([forces, signals, state])) - float(np.log(3))
+    return Free(alone.log, log, max(forces, state) > signals, float(forces), pushes)
 
 
 def free_sizes(response: Response) -> list[Floats]:
@@ -67,10 +74,16 @@ def free_sizes(response: Response) -> list[Floats]:
 def with_law(response: Response, sizes: Floats) -> tuple[float, float]:
     """Log evidence of a model with laws, and the posterior mean of rho, the discrepancy's size as a share of theirs.
 
+    In time, or over the state, equally probable: a law whose form is wrong is wrong in the same way in every episode.
+
     Args:
         sizes: (S,) rms of the laws along the fitted motion.
     """
-    found = evidences(response.tangent, [spread(response, rho * sizes) for rho in RHO])
-    logs = np.array([f.log for f in found]) + np.log(RHO_PRIOR)
-    total = log_sum(logs)
-    return total, float(np.exp(logs - total) @ np.array(RHO))
+    in_time = evidences(response.tangent, [spread(response, rho * sizes) for rho in RHO])
+    logs = [np.array([f.log for f in in_time])]
+    if np.any(sizes[: len(response.site_of)] > 0):
+        features = features_of(response, "state", sizes)
+        logs.append(np.append(logs[0][:1], [f.log for f in of_sizes(response, features, RHO[1:])]))
+    each = np.array(logs) + np.log(RHO_PRIOR) - np.log(len(logs))
+    total = log_sum(each.ravel())
+    return total, float(np.exp(each - total).sum(axis=0) @ np.array(RHO))

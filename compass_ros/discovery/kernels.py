@@ -9,17 +9,19 @@ features' weights are parameters with a common prior, so evidence is that of any
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from compass_ros.discovery.evidence import log_sum, widths
+from compass_ros.discovery.evidence import Solved, log_sum, widths
 from compass_ros.discovery.response import Response
 from compass_ros.discovery.settings import FREE
 from compass_ros.types import Floats
 
-Kernel = Literal["place", "velocity"]
+Kernel = Literal["place", "velocity", "state"]
+"""`state`: of both together."""
 FEATURES = 60
 """Of each direction; a budget: with 120 the evidence of the tests' fields is the same to two units of some hundreds."""
 LENGTH, FREEDOM = 0.5, 3
@@ -38,29 +40,39 @@ class Shared:
 
 
 def shared(response: Response, kernel: Kernel) -> Shared:
-    """The model of a response with such a discrepancy on all that is pushed."""
-    features = _features(response, kernel)
+    """The model of a response with such a discrepancy of any size on all that is pushed."""
+    features = features_of(response, kernel, response.unit)
+    found = of_sizes(response, features, FREE)
+    best = max(found, key=lambda f: f.log)
+    log = log_sum(np.array([f.log for f in found])) - float(np.log(len(found)))
+    return Shared(kernel, log, features @ best.parameters[-features.shape[3] :])
+
+
+def of_sizes(response: Response, features: Floats, sizes: Sequence[float]) -> list[Solved]:
+    """The model of a response with a discrepancy in (E, K, S, n) features, for several sizes of their weights."""
     tangent = response.tangent
     p, count = tangent.parameters.shape[2], features.shape[3]
     columns = tangent.pushes @ features.reshape(len(features), -1, count)
     wider = replace(tangent.more(columns, np.zeros(count)), pushes=tangent.pushes[:, :, :0])
-    stds = [np.concatenate([np.ones(p), np.full(count, size)]) for size in FREE]
-    found = widths(wider, stds)
-    best = max(found, key=lambda f: f.log)
-    log = log_sum(np.array([f.log for f in found])) - float(np.log(len(found)))
-    return Shared(kernel, log, features @ best.parameters[p:])
+    return widths(wider, [np.concatenate([np.ones(p), np.full(count, size)]) for size in sizes])
 
 
-def _features(response: Response, kernel: Kernel) -> Floats:
-    """(E, K, S, n) accelerations by each weight, of unit variance in the response's units."""
+def features_of(response: Response, kernel: Kernel, sizes: Floats) -> Floats:
+    """(E, K, S, n) accelerations by each weight, of a root mean square (S,) in each direction; none where zero."""
     rng = np.random.default_rng(0)
-    shape, count = response.kicks.states.shape[:2], len(response.site_of)
-    out = np.zeros((*shape, len(response.unit), count * FEATURES))
-    for s, n in enumerate(response.site_of):
-        at = response.along(int(n))[0 if kernel == "place" else 1]
-        spread = np.maximum(at.reshape(-1, at.shape[2]).std(axis=0), 1e-300)
+    shape = response.kicks.states.shape[:2]
+    on = [s for s in range(len(response.site_of)) if sizes[s] > 0]
+    out = np.zeros((*shape, len(response.unit), len(on) * FEATURES))
+    for i, s in enumerate(on):
+        place, rate = (of / _spread(of) for of in response.along(int(response.site_of[s])))
+        at = {"place": place, "velocity": rate, "state": np.concatenate([place, rate], axis=2)}[kernel]
         normal = rng.standard_normal((at.shape[2], FEATURES))
         frequency = normal / np.sqrt(rng.chisquare(FREEDOM, FEATURES) / FREEDOM) / LENGTH
-        wave = np.cos(at / spread @ frequency + rng.uniform(0, 2 * np.pi, FEATURES))
-        out[:, :, s, s * FEATURES : (s + 1) * FEATURES] = response.unit[s] * np.sqrt(2 / FEATURES) * wave
+        wave = np.cos(at @ frequency + rng.uniform(0, 2 * np.pi, FEATURES))
+        out[:, :, s, i * FEATURES : (i + 1) * FEATURES] = sizes[s] * np.sqrt(2 / FEATURES) * wave
     return out
+
+
+def _spread(of: Floats) -> Floats:
+    """(a,) standard deviation of (E, K, a) numbers, nowhere zero."""
+    return np.asarray(np.maximum(of.reshape(-1, of.shape[2]).std(axis=0), 1e-300))

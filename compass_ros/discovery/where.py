@@ -56,9 +56,11 @@ def _site(response: Response) -> int | None:
 def _depends_on(best: Shared, response: Response, free: Free) -> DependsOn | None:
     """Place or velocity where a function of it has clearly more evidence than of the other, or than one of time."""
     other = shared(response, "velocity" if best.kernel == "place" else "place")
-    if free.log > best.log + CLEARLY:
+    if free.in_time > best.log + CLEARLY:
         return "time"
-    return best.kernel if best.log > max(other.log, free.log) + CLEARLY else None
+    if best.log < max(other.log, free.in_time) + CLEARLY:
+        return None
+    return "place" if best.kernel == "place" else "velocity"
 
 
 def region(response: Response, pushes: Floats) -> Region | None:
