@@ -13,6 +13,8 @@ from compass_ros_interfaces.msg import (
     CausalGraph,
     Effect,
     EffectParameter,
+    ExplainedLaw,
+    Explanation,
     Gap,
     Mismatch,
     SimParameter,
@@ -72,18 +74,27 @@ def mismatch_message(result: Json, header: Header) -> Mismatch:
     """What is left after the calibration."""
     mismatch = result["mismatch"]
     where = mismatch["where"] or {}
-    region = where.get("region") or {}
+    region, interval = where.get("region") or {}, where.get("interval") or {}
+    site = where.get("site", "all")
     return Mismatch(
         header=header,
         verdict=mismatch["verdict"],
         object=where.get("object", ""),
+        site_kind=where.get("site_kind") or "",
+        sites=[] if site == "all" else site.split("+"),
         phase=where.get("phase", ""),
         channel=where.get("channel", ""),
         has_region=bool(region),
         region_centre_m=[float(value) for value in region.get("centre_m", (0, 0))],
         region_radius_m=float(region.get("radius_m", 0)),
         time_s=[float(value) for value in where.get("time_s") or ()],
+        range_of=interval.get("quantity", ""),
+        range=[float(interval.get(end, 0)) for end in ("low", "high")],
+        range_unit=interval.get("unit", ""),
+        depends_on=where.get("depends_on") or "",
         effects=[effect_message(effect) for effect in mismatch["effects"]],
+        explanations=[explanation_message(one) for one in mismatch.get("explanations", ())],
+        false_alarm=number(mismatch.get("false_alarm")),
         undetectable=mismatch["undetectable"],
         next_experiment=mismatch["next_experiment"] or "",
         sentence=mismatch["sentence"],
@@ -98,14 +109,37 @@ def effect_message(effect: Json) -> Effect:
     evidence = effect["evidence"]
     return Effect(
         name=effect["name"],
-        parameters=[
-            EffectParameter(name=name, value=number(one["value"]), std=number(one["std"]), unit=one["unit"])
-            for name, one in effect["parameters"].items()
-        ],
+        parameters=quantity_messages(effect["parameters"]),
         held_out_gain=number(evidence["held_out_gain"]),
         log_evidence=number(evidence["log_evidence"]),
         false_alarm_p=number(evidence["false_alarm_p"]),
         equivalents=effect["equivalents"],
+    )
+
+
+def quantity_messages(quantities: Json) -> list[EffectParameter]:
+    """Fitted numbers by name."""
+    return [
+        EffectParameter(name=name, value=number(one["value"]), std=number(one["std"]), unit=one["unit"])
+        for name, one in quantities.items()
+    ]
+
+
+def explanation_message(said: Json) -> Explanation:
+    """One explanation; its errors on held-out episodes are NaN where there are none."""
+    laws = [
+        ExplainedLaw(name=law["name"], sites=law["sites"], quantities=quantity_messages(law["quantities"]))
+        for law in said["laws"]
+    ]
+    errors = said.get("held_out") or {}
+    return Explanation(
+        laws=laws,
+        probability=said["probability"],
+        log_evidence=number(said["log_evidence"]),
+        held_out_before=number(errors.get("before")),
+        held_out_after=number(errors.get("after")),
+        held_out_floor=number(errors.get("floor")),
+        unit=errors.get("unit", ""),
     )
 
 
