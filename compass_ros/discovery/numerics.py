@@ -16,18 +16,23 @@ from compass_ros.simulation.numerics import other_numerics
 from compass_ros.types import Floats
 
 
-def shift(model: Hypothesis) -> Floats:
-    """(p,) how far the free quantities of a fit move when the time step is halved [prior standard deviations].
+def with_numerics(model: Hypothesis) -> Floats:
+    """(P + Q,) standard deviations, those of laws with what half the time step does to them.
 
-    What an effect is said to be is a claim about physics, and a simulator with a finite step says it not quite right.
+    What a law is said to be is a claim about physics, and a simulator with a finite step says it not quite right; the
+    parameters are those of this simulator.
     """
     simulator, likelihood, fit = model.simulator, model.likelihood, model.fit
     moved = _moved(simulator, likelihood, fit, {"timestep": 0.5 * simulator.options.timestep})
     weight = robust_weight(fit.linear.residual, fit.robust)
-    jacobian = fit.linear.jacobian
     hessian, _ = normal_equations(likelihood, fit.point, fit.linear, fit.free, fit.robust)
-    pull = np.einsum("efcp,efc->p", jacobian, weight * moved)
-    return np.asarray(-np.linalg.solve(hessian, np.pad(pull, (0, len(hessian) - len(pull)))))[: len(pull)]
+    pull = np.einsum("efcp,efc->p", fit.linear.jacobian, weight * moved)
+    shift = -np.linalg.solve(hessian, np.pad(pull, (0, len(hessian) - len(pull))))[: len(pull)]
+    std = model.std.copy()
+    of_laws = fit.free >= len(simulator.cell.parameters)
+    chosen = fit.free[of_laws]
+    std[chosen] = np.hypot(std[chosen], shift[of_laws] * likelihood.prior_std[chosen])
+    return std
 
 
 def _moved(simulator: Simulator, likelihood: Likelihood, fit: Fit, options: Mapping[str, float]) -> Floats:

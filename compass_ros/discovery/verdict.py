@@ -15,6 +15,7 @@ from compass_ros.discovery.floor import TWICE, shown_noise
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.maps import table_map
 from compass_ros.discovery.next_shot import next_experiment
+from compass_ros.discovery.numerics import with_numerics
 from compass_ros.discovery.search import Found
 from compass_ros.discovery.where import whereabouts
 from compass_ros.discovery.words import DEPENDS, errors, place, value_of, where_of
@@ -165,7 +166,7 @@ class Judge:
         before = table_map(plain.response, plain.free.pushes)
         if best is None:
             return Discovery(mismatch, tried=tried, before=before, warnings=self.warnings)
-        values, std = best.fit.point.values, best.std
+        values, std = best.fit.point.values, with_numerics(best)
         after = table_map(best.response, best.free.pushes)
         return Discovery(
             mismatch, best.simulator, values, values[:cell], std[:cell], std, tried, before, after, self.warnings
