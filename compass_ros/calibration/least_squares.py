@@ -224,7 +224,6 @@ def minimise(
     linear: Linear | None = None,
     fresh: bool = True,
     steps: Floats | None = None,
-    anew: bool = True,
     onset: Floats | None = None,
 ) -> Fit:
     """Levenberg-Marquardt from a point until a step would lower the cost by less than `tolerance` (log likelihood).
@@ -232,7 +231,6 @@ def minimise(
     Differences are taken anew only where the model failed to predict what a step did; otherwise Broyden's update keeps
     it going, which costs no rollout. `linear`: differences that are known already near the point. `fresh`: end with
     differences at the solution, as standard errors need them. `steps`: (p,) of the first differences, where known.
-    `anew`: False: a sketch of the fit from `linear` alone, for a tenth of the rollouts; it ends where that fails.
     `onset`: (E, p) where it is known at a point nearby and `linear` is not.
     """
     damping = 1e-3
@@ -258,16 +256,14 @@ def minimise(
             damping = max(damping * _TRIALS[best], 1e-9)
             point = replace(trials[best], cost=float(costs[best]))
             converged = exact and gained < tolerance
-            keep = converged or not anew or (gained > 0.5 * hoped and gained > tolerance)
+            keep = converged or (gained > 0.5 * hoped and gained > tolerance)
             linear = broyden(linear, residuals[best], move) if keep else None
             exact = False
         elif exact:
             damping *= 1e3
             converged = damping > 1e6
-        elif anew:
-            linear = None  # the updated differences were wrong: take them anew
         else:
-            break
+            linear = None  # the updated differences were wrong: take them anew
     if linear is None or (fresh and not exact):
         linear, _ = _linearise_well(likelihood, point, free, steps, onset)
     return Fit(point, linear, free, robust, iteration, converged)

@@ -78,14 +78,6 @@ def correlation_of(time: float) -> float:
     return (time - 1) / (time + 1)
 
 
-def neighbour_correlation(residual: Floats, seen: Bools) -> float:
-    """Correlation of neighbouring frames in (E, F, C) residuals, from 0 to MOST_CORRELATED."""
-    both = seen[:, 1:] & seen[:, :-1]
-    product = np.sum(np.where(both, residual[:, 1:] * residual[:, :-1], 0.0))
-    square = np.sum(np.where(both, residual[:, 1:] ** 2 + residual[:, :-1] ** 2, 0.0)) / 2
-    return float(np.clip(product / max(square, 1e-300), 0.0, MOST_CORRELATED))
-
-
 def integrated_correlation_time(residual: Floats, seen: Bools) -> float:
     """Frames that one independent number is worth in (E, F, C) residuals: 1 + 2 * the sum of the autocorrelation.
 

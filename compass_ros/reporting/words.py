@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from compass_ros.reporting.numbers import MINUS, with_unit
+from compass_ros.reporting.numbers import MINUS
 from compass_ros.types import DependsOn, ParameterRow, Phase, Result, SiteWord, Told, Unit, Verdict, Where
 
 Level = Literal["good", "note", "care", "bad"]
@@ -114,16 +114,6 @@ def fit_rmse(result: Result, model: Model) -> float:
     """Root mean square distance of a model on the fitted episodes [m]; NaN where there is none."""
     gap = result.gap.get(model, {}).get("fit")
     return gap.rmse_m if gap is not None else float("nan")
-
-
-def gap_line(result: Result) -> str:
-    """`held-out error 51 mm nominal -> 5.1 mm calibrated -> 1.2 mm with effects; noise floor 1.0 mm`."""
-    steps = [
-        f"{with_unit(held_out_rmse(result, model), result.unit)} {MODEL_LABEL[model]}"
-        for model in MODELS
-        if model in result.gap
-    ]
-    return f"held-out error {' → '.join(steps)}; noise floor {with_unit(result.noise_floor_m, result.unit)}"
 
 
 def where_rows(where: Where, unit: Unit) -> tuple[tuple[str, str], ...]:

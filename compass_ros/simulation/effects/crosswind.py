@@ -29,5 +29,4 @@ EFFECT = Effect(
     on=PLANAR,
     forces=_forces,
     superposes=False,
-    limit="table_tilt",
 )

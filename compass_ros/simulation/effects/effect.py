@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -37,11 +36,6 @@ class Quantity:
     """False for shapes (a centre, a radius, a frequency), which mean nothing while the amplitudes are zero."""
     start: float = 0.0
     """Where a search begins; for shapes."""
-    most: float = math.inf
-    """From here on an effect is no longer what its name says (a patch as wide as the table), and is not named; for
-    shapes."""
-    width: bool = False
-    """Whether it is how wide a field is, which at its least is no field any more."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +77,6 @@ class Effect:
     scattered: bool = False
     """Whether its number is another one in each episode, by chance around zero: a rollout may be given its own as an
     input beside the cell's (`Simulator.inputs`), and what a fit finds is the standard deviation."""
-    limit: str = ""
-    """Name of the simpler effect that it comes to at an end of its shapes' ranges; empty: none."""
     on_joint: Callable[[JointSize], tuple[Quantity, ...]] | None = None
     """Its quantities on a joint, from how that moves and what moves it; None: it acts on no joint."""
     on_drive: Callable[[DriveSize], tuple[Quantity, ...]] | None = None

@@ -24,7 +24,7 @@ EFFECT = Effect(
         Quantity("extra", "1", -0.15, 0.6, 0.02),
         Quantity("centre_x", "m", -0.45, 0.45, 0.05, amplitude=False, start=0.0),
         Quantity("centre_y", "m", -0.225, 0.225, 0.05, amplitude=False, start=0.0),
-        Quantity("radius", "m", 0.03, 0.3, 0.03, amplitude=False, start=0.1, most=0.2, width=True),
+        Quantity("radius", "m", 0.03, 0.3, 0.03, amplitude=False, start=0.1),
     ),
     sentence="a patch with other friction",
     on=("table",),

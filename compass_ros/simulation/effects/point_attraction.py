@@ -23,7 +23,7 @@ EFFECT = Effect(
         Quantity("strength", "m/s^2", 0.0, 3.0, 0.05),
         Quantity("centre_x", "m", -0.45, 0.45, 0.05, amplitude=False, start=0.0),
         Quantity("centre_y", "m", -0.225, 0.225, 0.05, amplitude=False, start=0.0),
-        Quantity("core", "m", 0.02, 0.3, 0.03, amplitude=False, start=0.08, width=True),
+        Quantity("core", "m", 0.02, 0.3, 0.03, amplitude=False, start=0.08),
     ),
     sentence="a pull towards a point",
     on=PLANAR,

@@ -23,7 +23,7 @@ def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
     v = size.fastest
     return (
         Quantity("extra", size.force_unit, 0.0, LARGEST * size.force, MODEST * size.force),
-        Quantity("speed", f"{size.length_unit}/s", 0.01 * v, 3.0 * v, 0.1 * v, amplitude=False, start=0.2 * v, most=v),
+        Quantity("speed", f"{size.length_unit}/s", 0.01 * v, 3.0 * v, 0.1 * v, amplitude=False, start=0.2 * v),
     )
 
 
@@ -32,11 +32,10 @@ EFFECT = Effect(
     channel="dynamics",
     quantities=(
         Quantity("extra", "1", 0.0, 0.5, 0.02),
-        Quantity("speed", "m/s", 0.01, 1.0, 0.05, amplitude=False, start=0.1, most=0.3),
+        Quantity("speed", "m/s", 0.01, 1.0, 0.05, amplitude=False, start=0.1),
     ),
     sentence="higher friction at low speed (Stribeck)",
     on=(*LYING, *JOINTS),
     forces=_forces,
     on_joint=_on_joint,
-    limit="coulomb_friction",
 )

@@ -24,7 +24,7 @@ EFFECT = Effect(
         Quantity("strength", "m/s^2", -3.0, 3.0, 0.05),
         Quantity("centre_x", "m", -0.45, 0.45, 0.05, amplitude=False, start=0.0),
         Quantity("centre_y", "m", -0.225, 0.225, 0.05, amplitude=False, start=0.0),
-        Quantity("radius", "m", 0.03, 0.4, 0.03, amplitude=False, start=0.12, width=True),
+        Quantity("radius", "m", 0.03, 0.4, 0.03, amplitude=False, start=0.12),
         Quantity("tail", "1", 0.0, 1.2, 0.3, amplitude=False, start=0.5),
     ),
     sentence="a push around a point",

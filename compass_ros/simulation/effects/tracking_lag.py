@@ -48,5 +48,4 @@ EFFECT = Effect(
     sentence="a lag of the tracker",
     on=("camera",),
     sensing=_sensing,
-    limit="camera_latency",
 )
