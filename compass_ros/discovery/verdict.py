@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -38,7 +37,7 @@ from compass_ros.types import (
 
 UNKNOWN = "unknown"
 SAID = 6
-"""Explanations that a result lists, the most probable first; the rest together are less than a thousandth or so."""
+"""Models with laws that a result lists; the rest together are less than a thousandth or so."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +55,8 @@ class Judge:
     undetectable: tuple[str, ...]
     seed: int
     warnings: tuple[str, ...]
+    opened: dict[str, float] = field(default_factory=dict)
+    """Held-out errors by name of the model, as they become known."""
 
     @property
     def simulator(self) -> Simulator:
@@ -173,7 +174,10 @@ class Judge:
         )
 
     def _explanations(self) -> tuple[Explanation, ...]:
-        """The most probable ones; held-out episodes are opened for each of them, now that the verdict stands."""
+        """That nothing is missing, `unknown`, and the most probable models, in the order of their probability.
+
+        Held-out episodes are opened for each of them, now that the verdict stands.
+        """
         none, unknown, of_models = self.found.probabilities
         plain = self.found.plain
         rows = [
@@ -184,7 +188,7 @@ class Judge:
                 for m, p in list(zip(self.found.models, of_models, strict=True))[:SAID]
             ),
         ]
-        return tuple(sorted(rows, key=lambda e: -e.probability))[:SAID]
+        return tuple(sorted(rows, key=lambda e: -e.probability))
 
     def _held_out(self, after: float) -> HeldOut:
         return HeldOut(self._before, after, self._floor, self.simulator.unit)
@@ -208,21 +212,15 @@ class Judge:
 
     def _after(self, model: Hypothesis) -> float:
         """Held-out error of the simulator with a model's laws."""
-        if model.name not in self._errors:
+        if model.name not in self.opened:
             judged, values = model.likelihood.on(self.held_out), model.fit.point.values
-            self._errors[model.name] = held_out_error(self.simulator.cell, judged, values)
-        return self._errors[model.name]
+            self.opened[model.name] = held_out_error(self.simulator.cell, judged, values)
+        return self.opened[model.name]
 
-    @cached_property
-    def _errors(self) -> dict[str, float]:
-        """Held-out errors that are known by now, by name of the model."""
-        return {}
-
-    @cached_property
+    @property
     def _before(self) -> float:
         """Held-out error of the simulator without laws."""
-        plain = self.found.plain
-        return held_out_error(self.simulator.cell, plain.likelihood.on(self.held_out), plain.fit.point.values)
+        return self._after(self.found.plain)
 
     @property
     def _flat(self) -> bool:

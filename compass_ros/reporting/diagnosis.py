@@ -103,7 +103,7 @@ def _signals(by_signal: Mapping[str, Any]) -> Table:
     table = Table("signal", *columns, "unit", title=f"Error by signal, {by_signal['on']}", title_justify="left")
     for row in by_signal["rows"]:
         name = f"  {row['name']}" if row["part"] else row["name"]
-        table.add_row(*map(Text, (name, *row["numbers"], row["floor"], unit_text(row["unit"]))))
+        table.add_row(*map(Text, (name, *row["numbers"], row["floor"], row["unit"])))
     return table
 
 

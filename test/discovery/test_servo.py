@@ -60,6 +60,8 @@ def test_a_law_on_a_servo_is_named_with_its_size(tmp_path: Path, law: str, numbe
 
 def opened(mismatch: Mismatch) -> None:
     """Each explanation with a simulator has its error on the held-out episodes; that of nothing has no other."""
+    listed = [tuple(law.name for law in one.laws) for one in mismatch.explanations]
+    assert {(), ("unknown",)} <= set(listed)
     for one in mismatch.explanations:
         names = [law.name for law in one.laws]
         assert (one.held_out is None) is (names == ["unknown"])

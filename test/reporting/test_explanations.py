@@ -112,17 +112,17 @@ def test_names_of_laws_are_no_markup(result: Result) -> None:
 def test_errors_by_signal_have_joints_and_floors(result: Result, held_out: bool) -> None:
     def gap(scale: float) -> Gap:
         joints = SignalGap(0.02 * scale, "rad", 0.002, {"elbow": 0.01 * scale, "wrist": 0.03 * scale})
-        return Gap({}, 1.0, {"joints": joints, "tip": SignalGap(0.5 * scale, "m", 0.0)})
+        return Gap({}, 1.0, {"joints": joints, "force": SignalGap(0.5 * scale, "N", 0.0)})
 
     parts = ("fit", "held_out") if held_out else ("fit",)
     of_models = {"nominal": 1.0, "calibrated": 0.5}
     told = replace(result, gap={m: dict.fromkeys(parts, gap(s)) for m, s in of_models.items()})  # type: ignore[arg-type, misc]
     shown = signals(told)
     assert [(row["name"], row["unit"], row["floor"]) for row in shown["rows"]] == [
-        ("joints", "rad", "0.002"), ("elbow", "rad", "0.002"), ("wrist", "rad", "0.002"), ("tip", "m", "\u2013"),
+        ("joints", "mrad", "2.00"), ("elbow", "mrad", "2.00"), ("wrist", "mrad", "2.00"), ("force", "N", "\u2013"),
     ]  # fmt: skip
     assert [row["numbers"][:2] for row in shown["rows"]] == [
-        ["0.02", "0.01"], ["0.01", "0.005"], ["0.03", "0.015"], ["0.5", "0.25"],
+        ["20.0", "10.0"], ["10.0", "5.00"], ["30.0", "15.0"], ["0.5", "0.25"],
     ]  # fmt: skip
     assert shown["on"] == ("episodes that were never fitted" if held_out else "the fitted episodes")
     for row in shown["rows"][:3]:

@@ -61,7 +61,7 @@ def _row(one: Explanation, first: Explanation, kept: bool) -> Ranked:
     return Ranked(
         laws=() if unknown else tuple((law.name, _sites(law)) for law in one.laws),
         title="no law that is known" if unknown else "" if one.laws else "nothing is missing",
-        probability=probability(one.probability),
+        probability="> 0.999" if one.probability > 0.999 else probability(one.probability),
         share=round(100 * one.probability, 1),
         removes=percent(share),
         removed=round(100 * min(max(share, 0.0), 1.0), 1) if math.isfinite(share) else 0.0,

@@ -7,10 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from compass_ros.reporting.drawing import MAX_REPLAYS, chosen, episode_rmse
-from compass_ros.reporting.numbers import plain, thousandths
+from compass_ros.reporting.numbers import plain, thousandths, unit_text
 from compass_ros.reporting.words import MODEL_LABEL, MODELS, Model, best_model, fit_rmse, held_out_rmse
 from compass_ros.types import Gap, Result
 
+SMALL = ("m", "rad")
+"""Units of which errors are shown in thousandths."""
 TIMES = "\N{MULTIPLICATION SIGN}"
 
 
@@ -89,20 +91,32 @@ def signals(result: Result) -> dict[str, Any]:
         {
             "name": part or s,
             "part": bool(part),
-            "unit": of_models["nominal"].signals[s].unit,
+            "unit": _shown(of_models["nominal"].signals[s].unit),
             "dots": [
                 {"key": m, "place": place}
                 for m in MODELS
                 if m in of_models and (place := scale.place(errors[s, part, m] / floor)) is not None
             ],
-            "numbers": [plain(errors.get((s, part, m), math.nan), 3) for m in MODELS],
-            "floor": plain(floor, 3),
+            "numbers": [
+                _digits(errors.get((s, part, m), math.nan), of_models["nominal"].signals[s].unit) for m in MODELS
+            ],
+            "floor": _digits(floor, of_models["nominal"].signals[s].unit),
         }
         for s, part, floor in found
     ]
     unseen = all("held_out" in parts for parts in result.gap.values())
     on = "episodes that were never fitted" if unseen else "the fitted episodes"
     return {"rows": rows if len(rows) > 1 else [], "floor": scale.place(1.0), "on": on}
+
+
+def _shown(unit: str) -> str:
+    """The unit in which an error is shown: mm and mrad, else its own."""
+    return f"m{unit}" if unit in SMALL else unit_text(unit)
+
+
+def _digits(error: float, unit: str) -> str:
+    """An error in the unit in which it is shown."""
+    return thousandths(error) if unit in SMALL else plain(error, 3)
 
 
 def _signals(of_models: Mapping[Model, Gap]) -> list[tuple[str, str, float]]:
