@@ -22,6 +22,7 @@ from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.scatter import ranked_scatter, with_scatter
 from compass_ros.discovery.settings import PRIOR_LAW, PRIOR_UNKNOWN, RHO, RHO_PRIOR
 from compass_ros.simulation.effects import Attached
+from compass_ros.simulation.sites import PLANAR
 from compass_ros.types import Floats
 
 RACED = 4
@@ -82,12 +83,16 @@ Tell = Callable[[str, float], bool]
 
 
 def rank(first: FirstOrder, candidates: Sequence[Candidate]) -> list[Ranked]:
-    """Laws at their best shape, the one that promises most first."""
+    """Laws at their best shape, the one that promises most first.
+
+    Joints and drives have each a size of their own too; what moves in one plane has a law in common or alone.
+    """
     of_chance = [ranked_scatter(first.response, c) for c in candidates if c.attached.effect.scattered]
     found = [best for c in candidates if not c.attached.effect.scattered for best in first.ranked(c)[:1]]
-    alone: dict[str, list[Ranked]] = {}
+    moving, alone = first.response.simulator.moving, dict[str, list[Ranked]]()
     for one in found:
-        if len(one.candidate.objects) == 1 and one.gain > 0:
+        own = [moving[name].kind for name in one.candidate.objects if name in moving]
+        if len(one.candidate.objects) == 1 and one.gain > 0 and not any(kind in PLANAR for kind in own):
             alone.setdefault(one.candidate.name, []).append(one)
     several = (first.together(singles) for singles in alone.values() if len(singles) > 1)
     return sorted([*found, *of_chance, *(one for one in several if one)], key=lambda f: -f.gain)

@@ -45,7 +45,7 @@ VERDICT_MEANING: Mapping[Verdict, str] = {
     "named": "A known effect explains what the calibrated simulator leaves over.",
     "ambiguous": "An effect is there, but these recordings cannot tell its candidates apart.",
     "unknown": "Something is there, and none of the known effects explains it.",
-    "fit_failed": "The fit reached neither the noise floor nor agreement with a second start, so nothing is named.",
+    "fit_failed": "What is left is the simulator's numerics, or a fit of the search had no solution; nothing is named.",
     "data_bad": "The recordings cannot answer the question, so nothing is named.",
     "not_evaluated": "Nobody looked for missing physics here. This is not a pass.",
 }
