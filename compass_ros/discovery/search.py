@@ -8,7 +8,7 @@ a discrepancy.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from math import log
 
@@ -28,6 +28,8 @@ from compass_ros.types import Floats
 RACED = 4
 """Neighbours that are fitted from their parent: a budget. Those that a discrepancy could bring before the best, whether
 from there or from the race, are fitted again with exact differences."""
+DEEPEST = 3
+"""Laws of a model at most, by name: a budget. What three laws do not explain is `unknown`."""
 SLIGHT = 0.01
 """Probability that is left to models that are not brought to their optimum: that of a false alarm."""
 STEPS = 4
@@ -53,6 +55,11 @@ class Prior:
             (singles if len(c.objects) <= 1 else shared)[c.name] += 1
         names = dict.fromkeys(c.name for c in candidates)
         return Prior({name: 2 ** singles[name] - 1 + shared[name] for name in names})
+
+    @property
+    def price(self) -> float:
+        """What the cheapest law costs."""
+        return max(self.of_laws([name]) for name in self.sites)
 
     def of_laws(self, names: Iterable[str]) -> float:
         """Each law counts once, whatever its sites."""
@@ -98,6 +105,36 @@ def rank(first: FirstOrder, candidates: Sequence[Candidate]) -> list[Ranked]:
     return sorted([*found, *of_chance, *(one for one in several if one)], key=lambda f: -f.gain)
 
 
+@dataclass(frozen=True, eq=False)
+class Known:
+    """Models that were fitted, by name, each with its log posterior odds against the plain one."""
+
+    prior: Prior
+    plain: float
+    """Log evidence of the plain model."""
+    models: dict[str, tuple[Hypothesis, float]]
+
+    def odds(self, model: Hypothesis, log_evidence: float) -> float:
+        return log_evidence - self.plain + self.prior.of_laws(a.effect.name for a in model.laws)
+
+    def take(self, models: Iterable[Hypothesis]) -> None:
+        """The better of two fits of one model stays."""
+        for model in models:
+            odds = self.odds(model, model.log_evidence)
+            if model.name not in self.models or odds > self.models[model.name][1]:
+                self.models[model.name] = (model, odds)
+
+    def promises(self, model: Hypothesis) -> bool:
+        """Whether a better fit could make it probable: a discrepancy beside it says how much is left."""
+        most = self.odds(model, max(model.log_evidence, model.free.log))
+        return most > max([float(np.log(SLIGHT)), *(odds for _, odds in self.models.values())])
+
+    @property
+    def ordered(self) -> list[tuple[Hypothesis, float]]:
+        """The most probable first."""
+        return sorted(self.models.values(), key=lambda one: -one[1])
+
+
 def search(
     plain: Hypothesis, first: Sequence[Ranked], candidates: Sequence[Candidate], beaten: float, tell: Tell
 ) -> Found:
@@ -108,41 +145,33 @@ def search(
     optimistic = max([found.unknown, *(f.gain + prior.of_laws([f.candidate.name]) for f in first)])
     if optimistic < beaten:
         return found
-    known: dict[str, tuple[Hypothesis, float]] = {}
-
-    def odds_of(h: Hypothesis, log_evidence: float) -> float:
-        return log_evidence - none + prior.of_laws(a.effect.name for a in h.laws)
-
-    def take(models: Iterable[Hypothesis]) -> None:
-        for h in models:
-            odds = odds_of(h, h.log_evidence)
-            if h.name not in known or odds > known[h.name][1]:
-                known[h.name] = (h, odds)
-
-    def promises(h: Hypothesis) -> bool:
-        """Whether a better fit could make it probable: a discrepancy beside it says how much is left."""
-        most = odds_of(h, max(h.log_evidence, h.free.log))
-        return most > max(float(np.log(SLIGHT)), *(odds for _, odds in known.values()))
-
-    price = max(prior.of_laws([name]) for name in prior.sites)
+    known = Known(prior, none, {})
     best, top, ranked = plain, 0.0, list(first)
-    while True:
-        tried = [neighbour(best, r) for r in promising(ranked, best)[:RACED]]
-        take(tried)
-        if found.unknown > 0 and (not known or calls_for_more(max(known.values(), key=lambda one: one[1])[0], price)):
-            take(race(best, cold_starts(ranked, best)))
-        take(further(h, STEPS) for h in tried if promises(h))
-        leader = max(known.values(), key=lambda one: one[1])
-        tell("fit effects", min(0.3 + 0.2 * len(leader[0].laws), 0.9))
-        if leader[1] <= top or not calls_for_more(leader[0], price):
+    while ranked:
+        _widen(known, best, ranked, found.unknown > 0)
+        if not known.models:
+            break  # nothing gains to first order, and no beginning calls for anything
+        (leader, odds), *_ = known.ordered
+        tell("fit effects", min(0.3 + 0.2 * len(leader.laws), 0.9))
+        names = {a.effect.name for a in leader.laws}
+        if odds <= top or not calls_for_more(leader, prior.price) or len(names) >= DEEPEST:
             break
-        best, top = leader
+        best, top = leader, odds
         ranked = rank(FirstOrder(best.response), candidates)
         if top + max(r.gain + prior.of_laws([r.candidate.name]) for r in ranked) < found.unknown:
             break  # no law more could come up to a free discrepancy
-    finish(known, odds_of, (0.0, found.unknown))
-    ordered = sorted(known.values(), key=lambda one: -one[1])
-    return Found(plain, found.unknown, tuple(h for h, _ in ordered), tuple(o for _, o in ordered), tuple(first))
+    finish(known, (0.0, found.unknown))
+    models = known.ordered
+    return Found(plain, found.unknown, tuple(h for h, _ in models), tuple(o for _, o in models), tuple(first))
+
+
+def _widen(known: Known, best: Hypothesis, ranked: Sequence[Ranked], called: bool) -> None:
+    """Fit the neighbours of a model with one law more; from where nothing is bent, where more is `called` for."""
+    tried = [neighbour(best, r) for r in promising(ranked, best)[:RACED]]
+    known.take(tried)
+    if called and (not known.models or calls_for_more(known.ordered[0][0], known.prior.price)):
+        known.take(race(best, cold_starts(ranked, best)))
+    known.take(further(h, STEPS) for h in tried if known.promises(h))
 
 
 def neighbour(parent: Hypothesis, ranked: Ranked) -> Hypothesis:
@@ -152,9 +181,7 @@ def neighbour(parent: Hypothesis, ranked: Ranked) -> Hypothesis:
     return from_parent(parent, ranked, STEPS)
 
 
-def finish(
-    known: dict[str, tuple[Hypothesis, float]], odds_of: Callable[[Hypothesis, float], float], others: Sequence[float]
-) -> None:
+def finish(known: Known, others: Sequence[float]) -> None:
     """Bring the models that hold all but SLIGHT of the probability to their optimum, in place.
 
     What a fit still lacks there, and rough differences, are worth some units of log evidence: as much as two laws may
@@ -163,25 +190,25 @@ def finish(
     a law.
     """
     done: set[str] = set()
-    while True:
-        total = log_sum(np.array([*others, *(odds for _, odds in known.values())]))
-        rest = -np.inf
-        name = None
-        for one, (_, odds) in sorted(known.items(), key=lambda item: item[1][1]):
-            rest = np.logaddexp(rest, odds)  # of this one and all less probable ones
-            if one not in done and rest - total > np.log(SLIGHT):
-                name = one
-        if name is None:
-            return
+    while (name := _unfinished(known, others, done)) is not None:
         done.add(name)
-        model = finished(known[name][0])
+        model = finished(known.models.pop(name)[0])
         if not model.weak:
-            known[name] = model, odds_of(model, model.log_evidence)
-            continue
-        del known[name]
-        if len(model.weak) < len(model.laws):
+            known.models[name] = model, known.odds(model, model.log_evidence)
+        elif len(model.weak) < len(model.laws):
             less = without(model, model.weak)
-            known.setdefault(less.name, (less, odds_of(less, less.log_evidence)))
+            known.models.setdefault(less.name, (less, known.odds(less, less.log_evidence)))
+
+
+def _unfinished(known: Known, others: Sequence[float], done: Collection[str]) -> str | None:
+    """The most probable model that holds a share of the probability and is not at its optimum; None: there is none."""
+    total = log_sum(np.array([*others, *(odds for _, odds in known.models.values())]))
+    rest, found = -np.inf, None
+    for name, (_, odds) in sorted(known.models.items(), key=lambda item: item[1][1]):
+        rest = np.logaddexp(rest, odds)  # of this one and all less probable ones
+        if name not in done and rest - total > np.log(SLIGHT):
+            found = name
+    return found
 
 
 def calls_for_more(model: Hypothesis, price: float) -> bool:
