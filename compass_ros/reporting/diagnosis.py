@@ -51,6 +51,9 @@ def print_diagnosis(result: Result, extras: ReportExtras, console: Console | Non
         out.print(Text(f"{finding.name} {_evidence(finding)}"))
     if result.mismatch.explanations:
         out.print(_explanations(result))
+        for row in ranked(result.mismatch):
+            if row.why:
+                out.print(Text(f"  {row.name}: {row.why}", "dim"))
     elif extras.candidates:
         out.print(_candidates(result, extras))
     by_signal = signals(result)
@@ -86,14 +89,18 @@ def _effect(finding: EffectFinding) -> Table:
 
 
 def _explanations(result: Result) -> Table:
+    columns = Column("removes", justify="right"), Column("held-out error", no_wrap=True)
     table = Table(
-        Column("explanation", overflow="fold"), Column("probability", no_wrap=True), Column("removes", justify="right"),
-        Column("held-out error", no_wrap=True), "", title="What could explain it", title_justify="left",
-    )  # fmt: skip
+        Column("explanation", overflow="fold"),
+        Column("probability", no_wrap=True),
+        *columns,
+        title="What could explain it",
+        title_justify="left",
+    )
     for row in ranked(result.mismatch):
         style = "bold" if row.kept else "dim"
         bar = FULL * round(row.share / 100 * WIDTH)
-        cells = (row.name, f"{bar:{WIDTH}} {row.probability}", row.removes, row.errors, row.why)
+        cells = (row.name, f"{bar:{WIDTH}} {row.probability}", row.removes, row.errors)
         table.add_row(*(Text(cell, style) for cell in cells))
     return table
 
