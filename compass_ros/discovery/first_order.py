@@ -49,6 +49,10 @@ class Ranked:
     """Whether these recordings would show the largest that is physical by SIGMAS."""
 
 
+Products = tuple[Floats, Floats, Floats]
+"""Of some pushes: among each other, with the parameters, with the residual; own numbers taken out."""
+
+
 class FirstOrder:
     """All laws about one response."""
 
@@ -70,11 +74,10 @@ class FirstOrder:
         self._weight = robust_weight(tangent.residual, tangent.robust) / tangent.correlation_time
         self._own = gram[:, own]
         self._taken = np.linalg.inv(inner)
-        self._kept: dict[tuple[int, ...], tuple[Floats, Floats, Floats]] = {}
 
-    def of_accelerations(self, weights: Floats, pushes: Ints) -> tuple[Floats, Floats]:
-        """(n, n) S and (n,) g of (E, h, n) accelerations at some (h,) of the pushes."""
-        gram, cross, pull = self._products(tuple(pushes))
+    def of_accelerations(self, weights: Floats, products: Products) -> tuple[Floats, Floats]:
+        """(n, n) S and (n,) g of (E, h, n) accelerations at the pushes of some products."""
+        gram, cross, pull = products
         moved = gram @ weights
         return self._projected(
             np.tensordot(weights, moved, ((0, 1), (0, 1))),
@@ -82,17 +85,14 @@ class FirstOrder:
             np.tensordot(weights, pull, ((0, 1), (0, 1))),
         )
 
-    def _products(self, pushes: tuple[int, ...]) -> tuple[Floats, Floats, Floats]:
-        """(E, h, h) of pushes among each other, (E, h, p) with parameters, (E, h) with the residual."""
-        if pushes not in self._kept:
-            p, own = self._parameters, self._parameters + np.array(pushes)
-            gram = self._gram
-            self._kept[pushes] = (
-                np.ascontiguousarray(gram[:, own[:, None], own]),
-                np.ascontiguousarray(gram[:, own, :p]),
-                np.ascontiguousarray(gram[:, own, -1]),
-            )
-        return self._kept[pushes]
+    def _products(self, pushes: Ints) -> Products:
+        """Of (h,) pushes: (E, h, h) among each other, (E, h, p) with parameters, (E, h) with the residual."""
+        p, own, gram = self._parameters, self._parameters + pushes, self._gram
+        return (
+            np.ascontiguousarray(gram[:, own[:, None], own]),
+            np.ascontiguousarray(gram[:, own, :p]),
+            np.ascontiguousarray(gram[:, own, -1]),
+        )
 
     def of_columns(self, columns: Floats) -> tuple[Floats, Floats]:
         """The same of (E, D, n) changes of the residual."""
@@ -150,9 +150,21 @@ class FirstOrder:
     # --- laws of forces
 
     def _of_forces(self, candidate: Candidate) -> list[Ranked]:
-        quantities, law = candidate.attached.effect.quantities, self._units(candidate)
-        shapes = best_shapes(quantities, lambda one: self._amplitudes(candidate, one, law(one))[1], STARTS, EVALUATIONS)
-        return [self._at(candidate, one, law(one)) for one in shapes]
+        """Shapes are asked by the hundred: what depends on the sites alone is worked out before."""
+        law, pushes = self._units(candidate), self._pushes(candidate)
+        products = self._products(pushes)
+        low, high, scale = _bounds(candidate)
+
+        def amplitudes(units: Floats) -> tuple[Floats, float]:
+            return best_sizes(*self.of_accelerations(units / scale, products), low, high, WIDTH * scale)
+
+        quantities, found = candidate.quantities, []
+        for shapes in best_shapes(quantities, lambda one: amplitudes(law(one))[1], STARTS, EVALUATIONS):
+            units, numbers = law(shapes), shapes.copy()
+            numbers[candidate.amplitudes], gain = amplitudes(units)
+            columns = self.response.tangent.pushes[:, :, pushes] @ (WIDTH * units)
+            found.append(self._judged(candidate, numbers, columns, gain))
+        return found
 
     def _units(self, candidate: Candidate) -> Callable[[Floats], Floats]:
         """At (q,) shapes, (E, h, a) accelerations per modest size of each amplitude, of the pushes of its sites."""
@@ -174,20 +186,6 @@ class FirstOrder:
         response = self.response
         moments, directions = len(response.kicks.moments_s), len(response.unit)
         return np.ravel(np.arange(moments)[:, None] * directions + response.pushed_by(candidate.attached))
-
-    def _amplitudes(self, candidate: Candidate, shapes: Floats, units: Floats) -> tuple[Floats, float]:
-        """(q,) numbers with the best amplitudes at a shape, and the gain."""
-        low, high, scale = _bounds(candidate)
-        moved = self.of_accelerations(units / scale, self._pushes(candidate))
-        sizes, gain = best_sizes(*moved, low, high, WIDTH * scale)
-        numbers = shapes.copy()
-        numbers[candidate.attached.amplitudes] = sizes
-        return numbers, gain
-
-    def _at(self, candidate: Candidate, shapes: Floats, units: Floats) -> Ranked:
-        numbers, gain = self._amplitudes(candidate, shapes, units)
-        columns = self.response.tangent.pushes[:, :, self._pushes(candidate)] @ (WIDTH * units)
-        return self._judged(candidate, numbers, columns, gain)
 
     def _judged(self, candidate: Candidate, numbers: Floats, columns: Floats, gain: float) -> Ranked:
         low, high, scale = _bounds(candidate)

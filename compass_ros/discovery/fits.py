@@ -135,8 +135,8 @@ def _whole(parent: Hypothesis, laws: Sequence[Attached], values: Floats) -> Hypo
     steps = np.concatenate([difference_steps(parent.fit.linear), np.full(len(own), 1 / WIDTH)])
     point = Point(values, np.zeros_like(likelihood.inputs), np.inf)
     robust = max(parent.fit.robust, 3.0 * typical_residual(likelihood, point))
-    fit = minimise(likelihood, point, free, 5, robust, 3.0, steps=steps, fresh=False)
-    fit = minimise(likelihood, fit.point, free, 5, parent.fit.robust, _SLIGHT)
+    fit = minimise(likelihood, point, free, FEW, robust, 3.0, steps=steps, fresh=False)
+    fit = minimise(likelihood, fit.point, free, FEW, parent.fit.robust, _SLIGHT)
     return Hypothesis((*parent.laws, *laws), simulator, likelihood, fit)
 
 

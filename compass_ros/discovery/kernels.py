@@ -23,9 +23,11 @@ from compass_ros.types import Floats
 Kernel = Literal["place", "velocity", "state"]
 """`state`: of both together."""
 FEATURES = 60
-"""Of each direction; a budget: with 120 the evidence of the tests' fields is the same to two units of some hundreds."""
+"""Of each direction; a budget. Of a local field on pucks (3 shots) the log evidence, some 3,400 over none, is 4 (place,
+velocity) to 6 (state) higher with 120, and 5 to 17 lower with 30: all alike, so what is compared moves by 2 or so."""
 LENGTH, FREEDOM = 0.5, 3
-"""Length of the kernel as a share of the spread of what was visited; degrees of freedom of its spectrum, 2 x 3/2."""
+"""Length of the kernel as a share of the spread of what was visited: a prior that a form is smooth over half of that;
+degrees of freedom of its spectrum, 2 x 3/2."""
 
 
 @dataclass(frozen=True, eq=False)

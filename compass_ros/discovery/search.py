@@ -1,8 +1,7 @@
-"""Which set of laws: neighbours ranked to first order, the best of them fitted, the better half of those fitted well.
+"""Which set of laws: neighbours ranked to first order, the best of them fitted, the probable ones fitted well.
 
-Models are sets of laws on sites. Neighbours of a model have one law more, or one less. The search goes on from the best
-models as long as a better one is found, and begins anew from the cell's first guess where what is left still calls for
-a discrepancy.
+Models are sets of laws on sites. Neighbours of a model have one law more. The search goes on from the best model as
+long as a better one is found; where what is left still calls for a discrepancy, laws race from where nothing is bent.
 """
 
 from __future__ import annotations
@@ -29,9 +28,10 @@ RACED = 4
 """Neighbours that are fitted from their parent: a budget. Those that a discrepancy could bring before the best, whether
 from there or from the race, are fitted again with exact differences."""
 DEEPEST = 3
-"""Laws of a model at most, by name: a budget. What three laws do not explain is `unknown`."""
+"""Laws of a model at most, by name: a budget, for each one more is a race more."""
 SLIGHT = 0.01
-"""Probability that is left to models that are not brought to their optimum: that of a false alarm."""
+"""Probability that is left to models that are not brought to their optimum: a budget. It is the
+default false-alarm rate and does not follow that setting."""
 STEPS = 4
 """Gauss-Newton steps of each fit: a budget. The evidence is taken at the maximum of the linear model, steps left over
 included."""

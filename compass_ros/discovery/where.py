@@ -15,7 +15,7 @@ from compass_ros.types import DependsOn, Floats, Interval, Region, Where
 
 HELD, WIDE = 0.9, 0.6
 """Share of a discrepancy's square that a range holds to be told as its place; share of all moments that it may hold at
-most, beyond which it is no place."""
+most, beyond which it is no place. They choose words and no verdict."""
 CLEARLY = 3.0
 """Difference of log evidence from which one thing is said and not the other: odds of 20 (Kass and Raftery 1995,
 'strong')."""
@@ -27,8 +27,8 @@ def whereabouts(response: Response, free: Free) -> Where:
         return Where("all", "all", "sensing")
     n = _site(response)
     name = response.sites[n].name if n is not None and len(response.sites) > 1 else "all"
-    best = max((shared(response, "place"), shared(response, "velocity")), key=lambda one: one.log)
-    depends_on = _depends_on(best, response, free)
+    other, best = sorted((shared(response, "velocity"), shared(response, "place")), key=lambda one: one.log)
+    depends_on = _depends_on(best, other, free)
     pushes = free.pushes if depends_on == "time" else best.pushes
     return Where(
         name,
@@ -53,9 +53,8 @@ def _site(response: Response) -> int | None:
     return best if best >= 0 else None
 
 
-def _depends_on(best: Shared, response: Response, free: Free) -> DependsOn | None:
+def _depends_on(best: Shared, other: Shared, free: Free) -> DependsOn | None:
     """Place or velocity where a function of it has clearly more evidence than of the other, or than one of time."""
-    other = shared(response, "velocity" if best.kernel == "place" else "place")
     if free.in_time > best.log + CLEARLY:
         return "time"
     if best.log < max(other.log, free.in_time) + CLEARLY:
