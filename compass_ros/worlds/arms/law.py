@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -43,7 +44,7 @@ class Moment:
 
 
 @dataclass(frozen=True)
-class Law:
+class Law(ABC):
     """Does nothing; a law overrides what it needs. Numbers of joints are (S,), in the order of `sites`."""
 
     sites: tuple[int, ...]
@@ -93,9 +94,9 @@ class Law:
         """(F,) when the joint states were taken that are stamped with (F,) times."""
         return time_s
 
+    @abstractmethod
     def missing(self, arm: Arm) -> Missing:
         """What the answer says of it."""
-        raise NotImplementedError
 
 
 def of_joints(law: Law, arm: Arm) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ iron poles, IEE Proceedings B 138(4), 1991: torque 2 T / (v / c + c / v), highes
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,8 +27,9 @@ from compass_ros.worlds.world import UNKNOWN, Missing
 class _Torque(Law):
     """One on each motor, (E, S) by angle and rate."""
 
+    @abstractmethod
     def torque(self, angle: Floats, rate: Floats) -> Floats:
-        raise NotImplementedError
+        """(E, S) [N m] of (E, S) angles and rates."""
 
     def force(self, moment: Moment, inner: Floats, effort: Floats) -> Floats:
         torque = np.zeros_like(effort)
