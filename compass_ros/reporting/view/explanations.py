@@ -58,13 +58,14 @@ def _row(one: Explanation, first: Explanation, kept: bool) -> Ranked:
     unknown = [law.name for law in one.laws] == [UNKNOWN]
     errors = one.held_out
     share = errors.removed if errors is not None and one.laws else math.nan
+    share = min(share, 1.0) if math.isfinite(share) else share  # beneath the floor nothing more is there to remove
     return Ranked(
         laws=() if unknown else tuple((law.name, _sites(law)) for law in one.laws),
         title="no law that is known" if unknown else "" if one.laws else "nothing is missing",
         probability="> 0.999" if one.probability > 0.999 else probability(one.probability),
         share=round(100 * one.probability, 1),
         removes=percent(share),
-        removed=round(100 * min(max(share, 0.0), 1.0), 1) if math.isfinite(share) else 0.0,
+        removed=round(100 * max(share, 0.0), 1) if math.isfinite(share) else 0.0,
         errors="" if errors is None else f"{_moved(errors.before, errors.after)}{NARROW}m{errors.unit}",
         kept=kept,
         why=why_less(one, first),
