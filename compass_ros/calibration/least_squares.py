@@ -47,6 +47,11 @@ class Linear:
     """(E, p) simulated time up to which a parameter did nothing in an episode [s], there where differences were taken;
     what the simulator need not repeat when they are taken anew nearby."""
 
+    def of(self, episodes: Ints) -> Linear:
+        """The same of some episodes."""
+        parts = (self.residual, self.jacobian, self.launch_jacobian, self.onset)
+        return Linear(*(part[episodes] for part in parts))
+
 
 @dataclass(frozen=True)
 class Fit:

@@ -37,6 +37,10 @@ class _Parted:
     """They come at a rate of their own."""
 
 
+KINDS = ("zeros", "constant", "two series")
+"""Of its findings."""
+
+
 def interleaved(series: Sequence[Series], level: Level) -> tuple[Finding, ...]:
     """What two kinds of values there are in the recordings of one signal."""
     parted = {one.recording: split for one in series if (split := _parted(one, level))}
@@ -45,11 +49,8 @@ def interleaved(series: Sequence[Series], level: Level) -> tuple[Finding, ...]:
     others = {name: told(p.rarer) for name, p in parted.items() if p.value is None}
     regular = {name for name, p in parted.items() if p.regular}
     found = []
-    for kind, samples, what in (
-        ("zeros", zeros, "zeros in between"),
-        ("constant", constant, "one and the same other value in between"),
-        ("two series", others, "two series of values take turns"),
-    ):
+    what_of = ("zeros in between", "one and the same other value in between", "two series of values take turns")
+    for kind, samples, what in zip(KINDS, (zeros, constant, others), what_of, strict=True):
         count, most = sum(map(len, samples.values())), sum(len(s.value) for s in series if s.recording in samples)
         rate = kind != "zeros" or regular & samples.keys()
         who = "two publishers on one topic" if rate else "samples that nobody filled in"

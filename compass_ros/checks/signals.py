@@ -11,7 +11,7 @@ from compass_ros.cells.limits import Limits
 from compass_ros.cells.signals import Signal
 from compass_ros.checks.finding import Finding
 from compass_ros.checks.frozen import frozen, held
-from compass_ros.checks.interleaved import interleaved
+from compass_ros.checks.interleaved import KINDS, interleaved
 from compass_ros.checks.series import Level, Series, level
 from compass_ros.checks.stamps import jumping_clock
 from compass_ros.checks.wrapped import unwrapped
@@ -92,7 +92,10 @@ def look(tracks: Mapping[str, Track], of: Sequence[Part]) -> LookedAt:
     mended = dict(once)
     for looked in done:
         mended = {name: _with(track, looked, name) for name, track in mended.items()}
-    return LookedAt(mended, tuple(done), (*found, *(one for looked in done for one in looked.findings)))
+    found += tuple(one for looked in done for one in looked.findings)
+    if not any(one.kind in KINDS for one in found):
+        found += jumping_clock(_together(done, mended, done[0].part.name.split(".")[0]))
+    return LookedAt(mended, tuple(done), found)
 
 
 def unlooked(tracks: Mapping[str, Track], of: Sequence[Part]) -> LookedAt:
@@ -111,9 +114,20 @@ def _checked(tracks: Mapping[str, Track], part: Part) -> Looked:
     known = level(straight.series, part.expected, part.step)
     if mixed := interleaved(straight.series, known):
         return replace(raw, findings=mixed)
-    found = (*frozen(straight.series, known), *straight.findings)
-    clock = () if part.turns else jumping_clock(straight.series, known)
-    return Looked(part, straight.series, known, (*found, *clock))
+    return Looked(part, straight.series, known, (*frozen(straight.series, known), *straight.findings))
+
+
+def _together(done: Sequence[Looked], tracks: Mapping[str, Track], signal: str) -> list[Series]:
+    """The numbers of all parts but turns, as they were mended, over what tells two of their values apart; where all
+    are there."""
+    straight = [looked for looked in done if not looked.part.turns]
+    apart = np.concatenate([looked.level.apart for looked in straight])
+    out = []
+    for name, track in tracks.items():
+        value = np.concatenate([track.value[:, looked.part.columns] for looked in straight], axis=1) / apart
+        seen = ~np.isnan(value).any(axis=1)
+        out.append(Series(name, signal, straight[0].part.limits.kind, track.stamp_ns[seen], value[seen]))
+    return out
 
 
 def _series(recording: str, track: Track, part: Part) -> Series:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from compass_ros.checks.finding import Finding
-from compass_ros.checks.series import Level, Series
+from compass_ros.checks.series import Series
 
 GAP = 1.8
 """Usual periods from which the time between two samples is a gap: one sample is missing, or the clock has jumped."""
@@ -20,26 +20,30 @@ def gaps(one: Series) -> list[int]:
     return [int(i) + 1 for i in np.flatnonzero(np.diff(one.time_s) > GAP * one.period_s)]
 
 
-def jumping_clock(series: Sequence[Series], level: Level) -> tuple[Finding, ...]:
-    """Recordings whose stamps jump while the motion goes on as if no time had passed."""
+def jumping_clock(series: Sequence[Series]) -> tuple[Finding, ...]:
+    """Recordings whose stamps jump while the motion goes on as if no time had passed.
+
+    `series`: all numbers of a signal, each in units that tell two values apart. They share the stamps, so all of them
+    must show the jump: of one joint among seven that turns round in a gap nothing follows.
+    """
     samples: dict[str, tuple[int, ...]] = {}
     longest = 0.0
     for one in series:
-        which = [i for i in gaps(one) if _no_time_passed(one, i, level)]
+        which = [i for i in gaps(one) if _no_time_passed(one, i)]
         samples |= {one.recording: tuple(which)} if which else {}
         longest = max([longest, *(float(one.time_s[i] - one.time_s[i - 1]) - one.period_s for i in which)])
     looks = f"the stamps jump (by up to {longest:.3g} s) and the motion does not"
     return (Finding("clock", "bad", series[0].signal, samples, looks),) if samples else ()
 
 
-def _no_time_passed(one: Series, late: int, level: Level) -> bool:
+def _no_time_passed(one: Series, late: int) -> bool:
     """Whether the sample is where it would be one period after the one before, and not where the stamps say.
 
     By the speeds before and after, which must be alike and make a difference that the noise does not conceal.
     """
     if late < 3 or late + 2 >= len(one.value):
         return False
-    scaled, time = one.value / level.apart, one.time_s
+    scaled, time = one.value, one.time_s
     before = (scaled[late - 1] - scaled[late - 3]) / (time[late - 1] - time[late - 3])
     after = (scaled[late + 2] - scaled[late]) / (time[late + 2] - time[late])
     if np.linalg.norm(before - after) > ALIKE * max(np.linalg.norm(before), np.linalg.norm(after)):

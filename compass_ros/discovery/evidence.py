@@ -140,8 +140,8 @@ class Factored:
         self._factor = _root(inner + np.eye(own_numbers + q))
         across = np.concatenate([gram[:, own, :p], self._turned @ gram[:, hats, :p]], axis=1)
         self._half = np.linalg.solve(self._factor, across)
-        taken = np.einsum("eij,eik->jk", self._half, self._half)
-        self.precision = gram[:, :p, :p].sum(axis=0) - taken + np.eye(p)
+        taken, whole = np.einsum("eij,eik->jk", self._half, self._half), gram[:, :p, :p].sum(axis=0)
+        self.precision = whole - taken + np.diag(1 + ROUNDING * np.diagonal(whole))
         self._outer = _root(self.precision)
         self.determinant = sum(
             float(np.log(np.diagonal(f, axis1=-2, axis2=-1)).sum()) for f in (self._factor, self._outer)

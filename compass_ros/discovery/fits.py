@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, Point, cost, difference_steps, extended, minimise
+from compass_ros.calibration.least_squares import Fit, Point, cost, difference_steps, extended, minimise, robust_loss
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import Strongest, growing, settled, strongest
 from compass_ros.calibration.residuals import typical_residual
@@ -22,9 +22,11 @@ from compass_ros.types import Floats, Ints
 
 _SHARES = (0.15, 0.4, 0.7, 1.0)
 """Parts of the first-order step from which a fit begins, the best of them."""
-EPISODES = 9
-"""Episodes, or windows, to which the models of a race are fitted until it is over: a budget; of twelve recordings all
-that are not held out."""
+TELLING = 300.0
+"""Log evidence against the plain model in the episodes, or windows, to which the models of a race are fitted until it
+is over: a budget. Where a hundredth of it decides, more recordings only cost time."""
+LEAST = 3
+"""Of these episodes, at least."""
 ETA = 3
 """One in so many goes on (Li et al. 2018, Hyperband: 3 or 4)."""
 FEW = 5
@@ -33,10 +35,34 @@ _SLIGHT = 0.3
 """Gain [log likelihood] of a step that is the last one: models are compared by whole units."""
 
 
-def from_parent(parent: Hypothesis, ranked: Ranked, iterations: int) -> Hypothesis:
-    """Fitted from the first-order solution about its parent's fit."""
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """A model with one law more, fitted to some episodes."""
+
+    laws: tuple[Attached, ...]
+    """The law, on each of its sites."""
+    values: Floats
+    """(P + q,)"""
+    cost: float
+    """Half the robust sum of squares of these episodes plus half the prior's."""
+
+
+def telling(parent: Hypothesis) -> Ints:
+    """Episodes that hold enough against a model to tell others apart by, spread over all; or all of them."""
+    count = len(parent.likelihood.inputs)
+    loss = robust_loss(parent.response.tangent.residual, parent.fit.robust).sum(axis=1)
+    against = (parent.free.log - parent.free.alone) * loss / float(loss.sum())
+    for n in range(LEAST, count):
+        rows = np.unique(np.linspace(0, count - 1, n).astype(int))
+        if float(against[rows].sum()) >= TELLING:
+            return np.asarray(rows)
+    return np.arange(count)
+
+
+def from_parent(parent: Hypothesis, ranked: Ranked, rows: Ints, iterations: int) -> Begun:
+    """Fitted to some episodes from the first-order solution about its parent's fit."""
     laws = ranked.candidate.parts
-    simulator, likelihood = widened(parent.simulator, parent.likelihood, laws)
+    _, likelihood = widened(parent.simulator, parent.likelihood.of(rows), laws)
     amplitude = ranked.candidate.amplitudes
     found = solve_beside(parent, ranked)
     tuned, base = parent.fit.free, parent.fit.point
@@ -46,13 +72,13 @@ def from_parent(parent: Hypothesis, ranked: Ranked, iterations: int) -> Hypothes
         values[tuned] += share * found * parent.likelihood.prior_std[tuned]
         numbers = np.where(amplitude, share * ranked.numbers, ranked.numbers)
         values = np.concatenate([values, numbers])
-        starts.append(Point(np.clip(values, likelihood.low, likelihood.high), base.launch, np.inf))
+        starts.append(Point(np.clip(values, likelihood.low, likelihood.high), base.launch[rows], np.inf))
     costs, residuals = cost(likelihood, starts, parent.fit.robust)
     best = int(np.argmin(costs))
     everything = np.concatenate([tuned, len(base.values) + np.arange(len(amplitude))])
-    linear = extended(parent.fit.linear, likelihood, starts[best], residuals[best], everything)
+    linear = extended(parent.fit.linear.of(rows), likelihood, starts[best], residuals[best], everything)
     fit = minimise(likelihood, starts[best], everything, iterations, parent.fit.robust, 1.0, linear, fresh=False)
-    return Hypothesis((*parent.laws, *laws), simulator, likelihood, fit, parent.response)
+    return Begun(laws, fit.point.values, fit.point.cost)
 
 
 def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:
@@ -66,29 +92,34 @@ def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:
     return change
 
 
-def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats]]) -> list[Hypothesis]:
-    """The best two of models with one more law each, by successive halving over a growing horizon.
+def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats]], rows: Ints) -> list[Begun]:
+    """The best two of models with one more law each, by successive halving over a growing horizon of some episodes.
 
     A simulator without a law bends other parameters to stand for it, and from there a fit may end in a valley beside
-    the right one. So the parent is fitted anew from the cell's first guess, to the beginning of some episodes and to
-    more and more of them, until a free discrepancy is called for: the fit before that is not bent yet. From there each
-    law goes on, the better third of them to the next horizon, and the last ones to all there is. `starts`: each law
-    with its (q,) numbers.
+    the right one. So the parent is fitted anew from the cell's first guess, to the beginning of each episode and to
+    more and more of it, until a free discrepancy is called for: the fit before that is not bent yet. From there each
+    law goes on, the better third of them to the next horizon. `starts`: each law with its (q,) numbers.
     """
-    count = len(parent.likelihood.inputs)
-    rows = np.unique(np.linspace(0, count - 1, min(count, EPISODES)).astype(int))
     values, begun, horizons = _unbent(parent, rows)
     runners = [_runner(parent, laws, np.append(values, numbers), rows, begun, horizons)
                for laws, numbers in starts]  # fmt: skip
     alive = list(range(len(runners)))
-    found: dict[int, Floats] = {}
+    found: dict[int, tuple[Likelihood, Fit]] = {}
     for _ in horizons:
-        costs = {}
         for i in alive:
-            _, fit = next(runners[i])
-            costs[i], found[i] = fit.point.cost, fit.point.values
-        alive = sorted(alive, key=lambda i: costs[i])[: max(len(alive) // ETA, 2)]
-    return [_whole(parent, starts[i][0], found[i]) for i in alive] if horizons else []
+            found[i] = next(runners[i])
+        alive = sorted(alive, key=lambda i: found[i][1].point.cost)[: max(len(alive) // ETA, 2)]
+    return [_at_the_end(parent, starts[i][0], *found[i]) for i in alive] if horizons else []
+
+
+def _at_the_end(parent: Hypothesis, laws: tuple[Attached, ...], likelihood: Likelihood, fit: Fit) -> Begun:
+    """Some steps more with all parameters of the parent free, and its loss."""
+    values = fit.point.values
+    free = np.concatenate([parent.fit.free, np.arange(len(parent.fit.point.values), len(values))])
+    robust = max(parent.fit.robust, 3.0 * typical_residual(likelihood, fit.point))
+    steps = np.append(difference_steps(parent.fit.linear), np.full(len(free) - len(parent.fit.free), 1 / WIDTH))
+    point = minimise(likelihood, fit.point, free, FEW, robust, 3.0, steps=steps, fresh=False).point
+    return Begun(laws, point.values, float(cost(likelihood, [point], parent.fit.robust)[0][0]))
 
 
 def _unbent(parent: Hypothesis, rows: Ints) -> tuple[Floats, Strongest, tuple[float, ...]]:
@@ -127,29 +158,23 @@ def _runner(
     return growing(likelihood.of(rows), values, held, begun, horizons)
 
 
-def _whole(parent: Hypothesis, laws: Sequence[Attached], values: Floats) -> Hypothesis:
-    """A model fitted to all episodes from (P + q,) values, with the parent's parameters free."""
-    simulator, likelihood = widened(parent.simulator, parent.likelihood, laws)
-    own = np.arange(len(parent.fit.point.values), len(values))
+def whole(parent: Hypothesis, begun: Begun) -> Hypothesis:
+    """A model fitted to all episodes, with exact differences at the end."""
+    simulator, likelihood = widened(parent.simulator, parent.likelihood, begun.laws)
+    own = np.arange(len(parent.fit.point.values), len(begun.values))
     free = np.concatenate([parent.fit.free, own])
-    steps = np.concatenate([difference_steps(parent.fit.linear), np.full(len(own), 1 / WIDTH)])
-    point = Point(values, np.zeros_like(likelihood.inputs), np.inf)
-    robust = max(parent.fit.robust, 3.0 * typical_residual(likelihood, point))
-    fit = minimise(likelihood, point, free, FEW, robust, 3.0, steps=steps, fresh=False)
-    fit = minimise(likelihood, fit.point, free, FEW, parent.fit.robust, _SLIGHT)
-    return Hypothesis((*parent.laws, *laws), simulator, likelihood, fit)
+    steps = np.append(difference_steps(parent.fit.linear), np.full(len(own), 1 / WIDTH))
+    point = Point(begun.values, parent.fit.point.launch, np.inf)
+    robust = 3.0 * typical_residual(likelihood, point)
+    if robust > parent.fit.robust:  # what these episodes did not hold is far off
+        point = minimise(likelihood, point, free, FEW, robust, 3.0, steps=steps, fresh=False).point
+    fit = minimise(likelihood, point, free, FEW, parent.fit.robust, _SLIGHT, steps=steps)
+    return Hypothesis((*parent.laws, *begun.laws), simulator, likelihood, fit)
 
 
 def finished(hypothesis: Hypothesis) -> Hypothesis:
     """At its optimum, with exact differences there."""
     return replace(hypothesis, fit=settled(hypothesis.likelihood, hypothesis.fit), near=None)
-
-
-def further(hypothesis: Hypothesis, iterations: int) -> Hypothesis:
-    """Some more steps, with differences at the end."""
-    fit = hypothesis.fit
-    fit = minimise(hypothesis.likelihood, fit.point, fit.free, iterations, fit.robust, _SLIGHT, fit.linear)
-    return replace(hypothesis, fit=fit, near=None)
 
 
 def without(model: Hypothesis, laws: Sequence[Attached]) -> Hypothesis:

@@ -16,7 +16,7 @@ import numpy as np
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.first_order import FirstOrder, Ranked
-from compass_ros.discovery.fits import finished, from_parent, further, race, without
+from compass_ros.discovery.fits import Begun, finished, from_parent, race, telling, whole, without
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.scatter import ranked_scatter, with_scatter
 from compass_ros.discovery.settings import PRIOR_LAW, PRIOR_UNKNOWN, RHO, RHO_PRIOR
@@ -25,16 +25,14 @@ from compass_ros.simulation.sites import PLANAR
 from compass_ros.types import Floats
 
 RACED = 4
-"""Neighbours that are fitted from their parent: a budget. Those that a discrepancy could bring before the best, whether
-from there or from the race, are fitted again with exact differences."""
+"""Neighbours that are fitted from their parent: a budget."""
 DEEPEST = 3
 """Laws of a model at most, by name: a budget, for each one more is a race more."""
 SLIGHT = 0.01
 """Probability that is left to models that are not brought to their optimum: a budget. It is the
 default false-alarm rate and does not follow that setting."""
 STEPS = 4
-"""Gauss-Newton steps of each fit: a budget. The evidence is taken at the maximum of the linear model, steps left over
-included."""
+"""Gauss-Newton steps of each fit from its parent: a budget."""
 
 
 @dataclass(frozen=True)
@@ -124,11 +122,6 @@ class Known:
             if model.name not in self.models or odds > self.models[model.name][1]:
                 self.models[model.name] = (model, odds)
 
-    def promises(self, model: Hypothesis) -> bool:
-        """Whether a better fit could make it probable: a discrepancy beside it says how much is left."""
-        most = self.odds(model, max(model.log_evidence, model.free.log))
-        return most > max([float(np.log(SLIGHT)), *(odds for _, odds in self.models.values())])
-
     @property
     def ordered(self) -> list[tuple[Hypothesis, float]]:
         """The most probable first."""
@@ -166,19 +159,33 @@ def search(
 
 
 def _widen(known: Known, best: Hypothesis, ranked: Sequence[Ranked], called: bool) -> None:
-    """Fit the neighbours of a model with one law more; from where nothing is bent, where more is `called` for."""
-    tried = [neighbour(best, r) for r in promising(ranked, best)[:RACED]]
-    known.take(tried)
-    if called and (not known.models or calls_for_more(known.ordered[0][0], known.prior.price)):
-        known.take(race(best, cold_starts(ranked, best)))
-    known.take(further(h, STEPS) for h in tried if known.promises(h))
+    """Fit the neighbours of a model with one law more; from where nothing is bent, where more is `called` for.
+
+    They are fitted to some episodes, and the best of them to all.
+    """
+    rows = telling(best)
+    tried = promising(ranked, best)[:RACED]
+    known.take(with_scatter(best, r) for r in tried if r.candidate.attached.effect.scattered)
+    begun = [from_parent(best, r, rows, STEPS) for r in tried if not r.candidate.attached.effect.scattered]
+    if called:
+        begun += race(best, cold_starts(ranked, best), rows)
+    known.take(whole(best, one) for one in probable(begun, known.prior))
 
 
-def neighbour(parent: Hypothesis, ranked: Ranked) -> Hypothesis:
-    """A model with one law more, fitted from its parent."""
-    if ranked.candidate.attached.effect.scattered:
-        return with_scatter(parent, ranked)
-    return from_parent(parent, ranked, STEPS)
+def probable(begun: Sequence[Begun], prior: Prior) -> list[Begun]:
+    """Those that could be probable, and the best two in any case; one of each set of laws on the same sites.
+
+    By the likelihood and the prior odds: what shapes cost is of the size of the margin.
+    """
+    best: dict[frozenset[tuple[str, tuple[str, ...]]], tuple[float, Begun]] = {}
+    for one in begun:
+        odds = prior.of_laws(a.effect.name for a in one.laws) - one.cost
+        sites = frozenset((a.effect.name, a.objects) for a in one.laws)
+        if sites not in best or odds > best[sites][0]:
+            best[sites] = odds, one
+    ordered = sorted(best.values(), key=lambda pair: -pair[0])
+    least = ordered[0][0] + 2 * log(SLIGHT) if ordered else 0.0
+    return [one for i, (odds, one) in enumerate(ordered) if i < 2 or odds > least]
 
 
 def finish(known: Known, others: Sequence[float]) -> None:

@@ -15,7 +15,9 @@ from pathlib import Path
 
 from compass_ros.concealed.comparison import compare
 from compass_ros.concealed.seal import unseal
+from compass_ros.proof.marks import judge
 from compass_ros.reporting import read_result
+from compass_ros.worlds.scenes import MODULES
 
 LIMIT_S = 1800
 """A calibration that takes longer counts as failed [s]."""
@@ -28,6 +30,7 @@ class Suite:
     name: str
     options: tuple[str, ...]
     first_seed: int
+    cell: str = "air_hockey"
 
 
 SUITES: Mapping[str, Suite] = {
@@ -37,9 +40,14 @@ SUITES: Mapping[str, Suite] = {
         Suite("small", ("--rms", "0.5e-3", "--kind", "one"), 22_000),
         Suite("tracker", ("--noise", "tracker"), 33_000),
         Suite("like", ("--forms", "like"), 41_000),
+        Suite("table", ("--forms", "foreign"), 710_000),
+        *(Suite(cell, (), 720_000 + 10_000 * i, cell) for i, cell in enumerate(MODULES)),
     )
 }
-"""main: the mix of the table. small: effects of 0.5 mm. tracker: a tracker's noise. like: the library's formulas."""
+"""main: the mix of the table. small: effects of 0.5 mm. tracker: a tracker's noise. like: the library's formulas. Of other
+engines (`worlds/`): table, and one suite for each other cell by its name."""
+FOREIGN = ("table", *MODULES)
+"""Suites of other engines."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +74,8 @@ def concealed(suite: Suite, seed: int) -> Iterator[Concealed]:
     with tempfile.TemporaryDirectory(prefix="compass_proof_") as folder:
         root = Path(folder)
         world, answers = root / "world", root / "answers"
-        conceal = ["conceal", "--seed", str(seed), "--out", str(world), "--answers", str(answers), *suite.options]
+        conceal = ["conceal", "--cell", suite.cell, "--seed", str(seed), "--out", str(world), "--answers", str(answers)]
+        conceal += suite.options
         error, seconds = timed([sys.executable, "-m", "compass_ros.cli", *conceal], root)
         yield Concealed(root, world, answers, f"conceal: {error}" if error else "", seconds)
 
@@ -78,19 +87,29 @@ def run(suite: Suite, seed: int, method: str, threads: int) -> dict[str, object]
             return {"error": made.error}
         config, out = made.root / "config.json", made.root / "result"
         config.write_text(json.dumps({"threads": threads}), encoding="utf-8")
-        given = ["--method", method, "--config", str(config), "--progress", "none", "--out", str(out)]
+        given = ["--cell", suite.cell, "--method", method, "--config", str(config), "--progress", "none", "--out", str(out)]
         error, took = made.blindly("calibrate", str(made.world), *given)
         seconds = {"conceal": made.seconds, "calibrate": took}
         opened = unseal(made.world, made.answers)
         if error:
-            truth = [effect["name"] for effect in _effects(opened.answer)]
+            truth = [law["name"] for law in _listed(opened.answer, "laws" if suite.name in FOREIGN else "effects")]
             return {"error": f"calibrate: {error}", "seconds": seconds, "kind": opened.answer["kind"], "truth": truth}
         result = read_result(out / "result.json")
+        if suite.name in FOREIGN:
+            return {
+                "error": None,
+                "seconds": seconds,
+                "marks": judge(result, opened.answer).as_json(),
+                "laws": _listed(opened.answer, "laws"),
+                "where": result["mismatch"]["where"],
+                "explanations": result["mismatch"]["explanations"][:_SHOWN],
+                "sentence": result["mismatch"]["sentence"],
+            }
         return {
             "error": None,
             "seconds": seconds,
             "marks": compare(result, opened.answer).as_json(),
-            "effects": [{k: e[k] for k in _KEPT} for e in _effects(opened.answer)],
+            "effects": [{k: e[k] for k in _KEPT} for e in _listed(opened.answer, "effects")],
             "numerics_rms_m": opened.answer["numerics_rms_m"],
             "where": result["mismatch"]["where"],
             "found": result["mismatch"]["effects"],
@@ -99,13 +118,15 @@ def run(suite: Suite, seed: int, method: str, threads: int) -> dict[str, object]
         }
 
 
+_SHOWN = 5
+"""Explanations that a line keeps."""
 _KEPT = ("name", "objects", "channel", "centre_m", "library", "shape", "size", "rms_m", "rms_before_m", "twins")
 
 
-def _effects(answer: Mapping[str, object]) -> list[Mapping[str, object]]:
-    effects = answer["effects"]
-    assert isinstance(effects, list)
-    return effects
+def _listed(answer: Mapping[str, object], name: str) -> list[Mapping[str, object]]:
+    found = answer[name]
+    assert isinstance(found, list)
+    return found
 
 
 def timed(command: list[str], folder: Path, limit_s: float = LIMIT_S) -> tuple[str, float]:

@@ -60,10 +60,10 @@ def table(found: Sequence[Line]) -> list[Row]:
         _share("outside the library: misnamed", outside, "misnamed", 0.03, most=True),
         _share("one effect: misnamed", one, "misnamed", 0.03, most=True),
         _where("one effect: object, phase and channel right", one, 0.97 - lower),
-        _proportion(f"centre within {100 * _CENTRE_M:.0f} cm", [c <= _CENTRE_M for c in centres], 0.97 - lower),
-        _median("parameters of effects: median error", [c["error"] for c in checks], 0.05, most=True),
+        at_least(f"centre within {100 * _CENTRE_M:.0f} cm", [c <= _CENTRE_M for c in centres], 0.97 - lower),
+        medians("parameters of effects: median error", [c["error"] for c in checks], 0.05, most=True),
         _between("parameters of effects: 90 % intervals hold the truth", [c["covered"] for c in checks], 0.80, 0.97),
-        _median("share of the excess held-out error removed, median", gains, 0.9 - lower),
+        medians("share of the excess held-out error removed, median", gains, 0.9 - lower),
         *_times(found),
         Row("left out above: an effect below 1 mm rms", "-", str(len(found) - len(judged)), "-", str(len(found)), None),
     ]
@@ -75,7 +75,7 @@ def _small(found: Sequence[Line]) -> list[Row]:
     modest = [_mark(line, "verdict") in ("none", "ambiguous") and not _mark(line, "misnamed") for line in missed]
     return [
         _share("one effect, named right or within its class", found, "right", 0.80),
-        _proportion("of the others: `none` or `ambiguous`", modest, 1.0),
+        at_least("of the others: `none` or `ambiguous`", modest, 1.0),
         _share("one effect: misnamed", found, "misnamed", 0.03, most=True),
         *_times(found),
     ]
@@ -108,15 +108,15 @@ def _kind(line: Line) -> str:
 
 
 def _share(what: str, among: Sequence[Line], mark: str, bar: float, most: bool = False) -> Row:
-    return _proportion(what, [bool(_mark(line, mark)) for line in among], bar, most)
+    return at_least(what, [bool(_mark(line, mark)) for line in among], bar, most)
 
 
 def _where(what: str, among: Sequence[Line], bar: float) -> Row:
     names = ("object_right", "phase_right", "channel_right")
-    return _proportion(what, [all(_mark(line, name) for name in names) for line in among], bar)
+    return at_least(what, [all(_mark(line, name) for name in names) for line in among], bar)
 
 
-def _proportion(what: str, outcomes: Sequence[bool], bar: float, most: bool = False) -> Row:
+def at_least(what: str, outcomes: Sequence[bool], bar: float, most: bool = False) -> Row:
     """Share of True with Wilson's interval."""
     text = f"{'<=' if most else '>='} {100 * bar:.0f} %"
     if not outcomes:
@@ -128,13 +128,13 @@ def _proportion(what: str, outcomes: Sequence[bool], bar: float, most: bool = Fa
 
 
 def _between(what: str, outcomes: Sequence[bool], low: float, high: float) -> Row:
-    row = _proportion(what, outcomes, low)
+    row = at_least(what, outcomes, low)
     share = float(np.mean(outcomes)) if outcomes else np.nan
     reached = bool(low <= share <= high) if outcomes else None
     return Row(what, f"{100 * low:.0f} to {100 * high:.0f} %", row.value, row.interval, row.count, reached)
 
 
-def _median(what: str, values: Sequence[float], bar: float, most: bool = False) -> Row:
+def medians(what: str, values: Sequence[float], bar: float, most: bool = False) -> Row:
     """Median with a bootstrap interval; shares as per cent."""
     return _of_medians(what, values, bar, most, lambda x: f"{100 * x:.1f} %")
 

@@ -12,7 +12,7 @@ from compass_ros.simulation.simulator import CHUNK, Simulator
 from compass_ros.simulation.transitions import Chart, chained, changes
 from compass_ros.types import Floats
 
-_TINY = 1e-3
+_TINY = 1e-5
 """Size of the change of an observation that its derivative is taken from, as a share of the range of the raw row."""
 
 
