@@ -41,6 +41,8 @@ class BodySize:
     """The larger of gravity and of what turns its speed within the spread of its places [m/s^2]."""
     centred: bool = False
     """Whether MuJoCo has compiled it as a body whose mass is at its origin, for good."""
+    turns: bool = True
+    """Whether its orientation is measured, and so what spin it has."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +99,9 @@ def along(model: mujoco.MjModel, bodies: Sequence[str], states: Floats) -> dict[
     return {name: Path(rows[:, i, :3], rows[:, i, 3:6], rows[:, i, 6:]) for i, name in enumerate(bodies)}
 
 
-def body_size(model: mujoco.MjModel, site: Site, path: Path, seconds: float, noise: float) -> BodySize:
-    """Of a body that went along a path in episodes of so many seconds, seen with a noise [m]."""
+def body_size(model: mujoco.MjModel, site: Site, path: Path, seconds: float, noise: float, turns: bool) -> BodySize:
+    """Of a body that went along a path in episodes of so many seconds, seen with a noise [m], with its orientation or
+    without."""
     body = model.body(site.name).id
     mass = float(model.body_mass[body])
     extent = float(np.sqrt(model.body_inertia[body].sum() / (2 * mass)))
@@ -108,7 +111,7 @@ def body_size(model: mujoco.MjModel, site: Site, path: Path, seconds: float, noi
     spin = max(_rms(np.linalg.norm(path.spin, axis=1)), MODEST * speed / extent)
     acceleration = max(float(np.linalg.norm(model.opt.gravity)), speed**2 / spread)
     centred = bool(model.body_simple[body])
-    return BodySize(site.kind, mass, extent, speed, max(float(speeds.max()), speed), spin, acceleration, centred)
+    return BodySize(site.kind, mass, extent, speed, max(float(speeds.max()), speed), spin, acceleration, centred, turns)
 
 
 def pair_size(kind: SiteKind, one: tuple[BodySize, Path], other: tuple[BodySize, Path]) -> PairSize:
@@ -130,9 +133,9 @@ def standing(model: mujoco.MjModel) -> BodySize:
     return BodySize("body", np.inf, np.inf, 0.0, 0.0, 0.0, float(np.linalg.norm(model.opt.gravity)))
 
 
-def unit_body(centred: bool = False) -> BodySize:
+def unit_body(centred: bool = False, turns: bool = True) -> BodySize:
     """A body whose every number is one: for the names and units of quantities."""
-    return BodySize("body", 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, centred)
+    return BodySize("body", 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, centred, turns)
 
 
 def unit_pair(kind: SiteKind) -> PairSize:
@@ -150,7 +153,7 @@ def unit_sizes(kind: SiteKind) -> tuple[Size, ...]:
         return tuple(SignalSize(kind, unit, 1.0) for unit in SIGNAL_UNITS)
     if kind in PAIRS:
         return (unit_pair(kind),)
-    return (unit_body(), unit_body(centred=True)) if kind == "body" else ()
+    return (unit_body(), unit_body(centred=True), unit_body(turns=False)) if kind == "body" else ()
 
 
 def _moment(model: mujoco.MjModel, data: mujoco.MjData, bodies: Sequence[str], state: Floats) -> Iterator[Floats]:

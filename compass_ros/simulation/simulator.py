@@ -248,9 +248,7 @@ class Simulator:
 
         return at
 
-    def play(
-        self, values: Floats, start: Floats, controls: Floats | None, steps: int
-    ) -> tuple[Floats, Floats]:
+    def play(self, values: Floats, start: Floats, controls: Floats | None, steps: int) -> tuple[Floats, Floats]:
         """(B, T, s) full states and (B, T, nsensordata) sensors after each of T steps from (B, s) states."""
         return self._player.play(self.physics, values, start, controls, steps)
 

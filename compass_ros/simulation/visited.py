@@ -39,8 +39,9 @@ class Visited:
         found, seconds = paths(model, names, states), states.shape[1] * simulator.time_step
         sites = {name: simulator.places.body(name) for name in names}
         noise = simulator.cell.spec.noise_m
+        turning = {name for s in simulator.cell.signals if s.quantity == "pose" for name in s.at}
         return {
-            name: body_size(model, site, found[name], seconds, noise) if site else standing(model)
+            name: body_size(model, site, found[name], seconds, noise, name in turning) if site else standing(model)
             for name, site in sites.items()
         }, found
 

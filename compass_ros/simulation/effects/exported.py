@@ -116,11 +116,11 @@ def read_effects(path: Path | str) -> Exported:
 
 def _fitted(entry: _Entry, path: Path | str) -> FittedEffect:
     found = {name: value.unit for name, value in entry.values.items()}
-    variants = [(kind, _units(kind)) for kind in _variants(entry, path)]
-    kind, expected = next((v for v in variants if v[1] == found), variants[0])
-    if found != expected:
+    variants = _variants(entry, path)
+    kind = next((v for v in variants if _units(v) == _later(v, found) | found), variants[0])
+    if (expected := _units(kind)) != _later(kind, found) | found:
         raise ConfigError(f"{path}: {entry.name}: expected values with units {expected}, found {shown(found)}")
-    given = [entry.values[q.name] for q in kind.quantities]
+    given = [entry.values.get(q.name, _Value(value=0.0, unit=q.unit)) for q in kind.quantities]
     std = tuple(float("nan") if v.std is None else v.std for v in given)
     return FittedEffect(Attached(kind, entry.objects), tuple(v.value for v in given), std)
 
@@ -133,6 +133,11 @@ def _variants(entry: _Entry, path: Path | str) -> list[Effect]:
     if entry.on not in kind.on:
         raise ConfigError(f"{path}: {entry.name}: on: expected one of {', '.join(kind.on)}, found '{entry.on}'")
     return [kind.at(size) for size in unit_sizes(entry.on)] or [kind.on_kinds((entry.on,))]
+
+
+def _later(kind: Effect, found: Mapping[str, str]) -> dict[str, str]:
+    """Shapes that a law has got since a file was written, and that are zero in it."""
+    return {q.name: q.unit for q in kind.quantities if not q.amplitude and q.low <= 0 and q.name not in found}
 
 
 def _units(kind: Effect) -> dict[str, str]:

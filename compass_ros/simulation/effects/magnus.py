@@ -1,11 +1,13 @@
 """A push across the motion, as on a spinning body.
 
 F = m rate (-v_y, v_x), for a spin that stays the same over an episode; on a body in space F = m coefficient w x v, w
-its own spin.
+its own spin, or F = m (rate_x, rate_y, rate_z) x v where its orientation is not measured and nobody knows how it spins.
 Source: Magnus force, proportional to spin times speed (Kutta-Joukowski); `rate` holds spin and air density.
 """
 
 from __future__ import annotations
+
+import numpy as np
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.extents import BodySize
@@ -16,10 +18,16 @@ from compass_ros.types import Floats
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
+    """Of a body in space: a share of its own spin, then three rates beside."""
+    if numbers.shape[1] == len("xyz"):
+        numbers = np.pad(numbers, ((0, 0), (1, 0)))
     return tuple(Term(Kind.MAGNUS, site, numbers) for site in context.sites)
 
 
 def _on_body(size: BodySize) -> tuple[Quantity, ...]:
+    if not size.turns:
+        rate = size.acceleration / size.speed
+        return tuple(Quantity(f"rate_{axis}", "1/s", -LARGEST * rate, LARGEST * rate, MODEST * rate) for axis in "xyz")
     most = size.acceleration / (size.spin * size.speed)
     return (Quantity("coefficient", "1", -LARGEST * most, LARGEST * most, MODEST * most),)
 

@@ -186,11 +186,11 @@ static Force evaluate(const Term* term, const State* s) {
       double c = r * r + p[3] * p[3], k = -s->mass * p[0] * 2.598076211353316 * p[3] * p[3] / (c * sqrt(c));
       return (Force){k * rx, k * ry, 0};
     }
-    case MAGNUS:           // p: rate (BODY: share of spin x velocity)
+    case MAGNUS:           // p: rate (BODY: share of spin x velocity, and a vector that the spin is not known of)
       if (term->object == BODY) {
-        const double* w = s->spin;
-        double k = s->mass * p[0];
-        return (Force){k * (w[1] * s->vz - w[2] * s->vy), k * (w[2] * s->vx - w[0] * s->vz), k * (w[0] * s->vy - w[1] * s->vx)};
+        double x = s->mass * (p[0] * s->spin[0] + p[1]), y = s->mass * (p[0] * s->spin[1] + p[2]);
+        double z = s->mass * (p[0] * s->spin[2] + p[3]);
+        return (Force){y * s->vz - z * s->vy, z * s->vx - x * s->vz, x * s->vy - y * s->vx};
       }
       return (Force){-s->mass * p[0] * s->vy, s->mass * p[0] * s->vx, 0};
     case LIBRARY: {        // p: coefficient, powers of x, y, vx, vy, speed; component (0 x, 1 y, 2 against the velocity)
@@ -199,8 +199,10 @@ static Force evaluate(const Term* term, const State* s) {
       if (p[6] == 2) return along(s, value, term->object == JOINT ? 0 : 1e-3);
       return p[6] == 0 ? (Force){value, 0, 0} : (Force){0, value, 0};
     }
-    case SPRING:           // p: stiffness, rest
-      return (Force){-s->mass * p[0] * (s->x - p[1]), 0, 0};
+    case SPRING: {         // p: stiffness, rest, lever
+      double away = s->x - p[1];
+      return (Force){-s->mass * p[0] * (p[2] ? sin(p[2] * away) / p[2] : away), 0, 0};
+    }
     case ASYMMETRIC:       // p: extra friction forwards
       return s->vx > 0 ? along(s, p[0], 0) : (Force){0, 0, 0};
     case LOAD_FRICTION:    // p: friction as a share of the load

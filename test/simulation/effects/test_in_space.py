@@ -10,6 +10,7 @@ import pytest
 
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.effects import Attached, Exported, FittedEffect, attach, effect
+from compass_ros.simulation.extents import unit_body
 from compass_ros.types import Floats
 from test.simulation.effects.scenes import Acceleration, flown
 
@@ -67,6 +68,16 @@ def test_a_force_on_a_flying_body_is_what_its_formula_says(name: str) -> None:
     assert moved > 0.02
     np.testing.assert_allclose(data.qpos[:3], expected[:3], atol=2e-3 * moved + 3e-4)
     np.testing.assert_allclose(data.qvel[3:6], SPIN, rtol=1e-9)
+
+
+@pytest.mark.parametrize("rates", [(0.8, 0.0, 0.0), (0.0, -0.5, 0.9), (0.4, 0.6, -0.7)])
+def test_a_spin_that_is_not_measured_is_three_rates(rates: tuple[float, float, float]) -> None:
+    kind = effect("magnus").at(unit_body(turns=False))
+    given = Exported((FittedEffect(Attached(kind, ("ball",)), rates, ()),), {})
+    data = after(free(ASKEW), given, 0.5, START, np.concatenate([SPEED, SPIN]))
+    expected = flown(lambda t, r, v: ASKEW + np.cross(rates, v), START, SPEED, 0.5, STEPS)
+    np.testing.assert_allclose(data.qpos[:3], expected[:3], atol=1e-3)
+    assert np.linalg.norm(data.qpos[:3] - START - 0.5 * SPEED - 0.125 * ASKEW) > 0.05
 
 
 @pytest.mark.parametrize("gravity", [(0, 0, -9.81), (0, 0, 9.81), (9.81, 0, 0), (-9.81, 0, 0), (0, -3, 0), (1, 2, -2)])

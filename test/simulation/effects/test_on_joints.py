@@ -131,9 +131,41 @@ def test_a_spring_swings_with_its_frequency() -> None:
     )
     data = mujoco.MjData(model)
     spring = Attached(effect("spring").at(unit_joint("hinge")), ("axis",))
-    with attach(model, data, Exported((FittedEffect(spring, (4.0, 0.3), ()),), {})):
+    with attach(model, data, Exported((FittedEffect(spring, (4.0, 0.3, 0.0), ()),), {})):
         mujoco.mj_step(model, data, nstep=round(np.pi / 4.0 / 1e-4))
     assert data.qpos[0] == pytest.approx(0.6, rel=1e-3)  # half a period of 2 pi / sqrt(4 / 0.25)
+
+
+@pytest.mark.parametrize("rest", [0.0, 0.7, -2.0])
+def test_a_spring_on_levers_is_one_between_two_points(rest: float) -> None:
+    """MuJoCo's own: a tendon of zero free length, from 0.2 m beside the axis to 0.1 m out on the link."""
+    of = (
+        '<mujoco><option timestep="1e-4" gravity="0 0 0"/><worldbody>{anchor}<body><joint name="axis" axis="0 0 1"/>'
+        '<inertial pos="0 0 0" mass="1" diaginertia="1 1 0.25"/><site name="out" pos="0.1 0 0"/></body></worldbody>'
+        "{rest}</mujoco>"
+    )
+    anchor = f'<site name="fixed" pos="{0.2 * np.cos(rest)} {0.2 * np.sin(rest)} 0"/>'
+    tendon = (
+        '<tendon><spatial stiffness="200" springlength="0"><site site="fixed"/><site site="out"/></spatial></tendon>'
+    )
+    drawn = mujoco.MjModel.from_xml_string(of.format(anchor=anchor, rest=tendon))
+    bare = mujoco.MjModel.from_xml_string(of.format(anchor="", rest=""))
+    expected, data = mujoco.MjData(drawn), mujoco.MjData(bare)
+    spring = Attached(effect("spring").at(unit_joint("hinge")), ("axis",))
+    with attach(bare, data, Exported((FittedEffect(spring, (200 * 0.2 * 0.1, rest, 1.0), ()),), {})):
+        for it, model in ((expected, drawn), (data, bare)):
+            it.qpos[0] = rest + 2.0
+            mujoco.mj_step(model, it, nstep=5000)
+    assert abs(expected.qpos[0] - rest - 2.0) > 0.3
+    assert data.qpos[0] == pytest.approx(expected.qpos[0], abs=1e-6)
+
+
+def test_a_file_of_before_springs_had_levers_still_reads(tmp_path: Path) -> None:
+    numbers = "{stiffness: {value: 3.0, unit: N m/rad}, rest: {value: 0.1, unit: rad}}"
+    file = tmp_path / "effects.yaml"
+    file.write_text(f"effects: [{{name: spring, objects: [it], 'on': hinge, values: {numbers}}}]\nsliding: {{}}\n")
+    (back,) = read_effects(file).effects
+    assert back.values == (3.0, 0.1, 0.0)
 
 
 @pytest.mark.parametrize("kind", ["hinge", "slide"])
