@@ -24,14 +24,18 @@ def jumping_clock(series: Sequence[Series]) -> tuple[Finding, ...]:
     """Recordings whose stamps jump while the motion goes on as if no time had passed.
 
     `series`: all numbers of a signal, each in units that tell two values apart. They share the stamps, so all of them
-    must show the jump: of one joint among seven that turns round in a gap nothing follows.
+    must show the jump: of one joint among seven that turns round in a gap nothing follows. Nor does it from one gap
+    among many of its length, in which time did pass: where frames are lost all the time, now and then a motion stops.
     """
+    late = [(one, i, one.time_s[i] - one.time_s[i - 1]) for one in series for i in gaps(one)]
+    lengths = np.array([length for _, _, length in late])
+    still = np.array([_no_time_passed(one, i) for one, i, _ in late], bool)
     samples: dict[str, tuple[int, ...]] = {}
     longest = 0.0
-    for one in series:
-        which = [i for i in gaps(one) if _no_time_passed(one, i)]
-        samples |= {one.recording: tuple(which)} if which else {}
-        longest = max([longest, *(float(one.time_s[i] - one.time_s[i - 1]) - one.period_s for i in which)])
+    for (one, i, length), jumped in zip(late, still, strict=True):
+        if jumped and np.mean(still[lengths > 0.5 * length]) > 0.5:
+            samples[one.recording] = (*samples.get(one.recording, ()), i)
+            longest = max(longest, float(length - one.period_s))
     looks = f"the stamps jump (by up to {longest:.3g} s) and the motion does not"
     return (Finding("clock", "bad", series[0].signal, samples, looks),) if samples else ()
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from compass_ros.proof.lines import Key, Line
 
 
@@ -20,6 +22,9 @@ def prove(
     suite: Annotated[
         list[str] | None,
         typer.Option(help="main, small (0.5 mm), tracker (its noise) or like (the library's formulas)"),
+    ] = None,
+    cell: Annotated[
+        list[str] | None, typer.Option(help="worlds from another engine: of this cell, or of all; instead of a suite")
     ] = None,
     out: Annotated[Path, typer.Option(help="results, one line a world")] = Path("proof/results.jsonl"),
     jobs: Annotated[int, typer.Option(min=1, help="worlds at a time")] = 1,
@@ -36,10 +41,10 @@ def prove(
     from compass_ros.proof import lines
     from compass_ros.proof.campaign import Plan, in_processes
     from compass_ros.proof.campaign import prove as campaign
-    from compass_ros.proof.one_world import SUITES
+    from compass_ros.proof.one_world import FOREIGN, SUITES
     from compass_ros.proof.page import groups, write_page
 
-    suites = tuple(suite or ("main",))
+    suites = (*(suite or ()), *_of_cells(cell or ())) or ("main",)
     for name in suites:
         if name not in SUITES:
             raise ConfigError(f"unknown suite '{name}'; known: {', '.join(SUITES)}{nearest(name, SUITES)}")
@@ -55,6 +60,9 @@ def prove(
         raise ConfigError(f"{out}: no results; `compass prove` without --table makes them")
     for (name, by), among in groups(found).items():
         _print(f"{name}, method {by}: {lines.counted(among)}", among)
+    foreign = [line for line in found if line["suite"] in FOREIGN]
+    if foreign:
+        _print(f"worlds from other engines, all scenes: {lines.counted(foreign)}", foreign)
     theirs = list(lines.read(rivals_out).values())
     _print_rivals(theirs, found)
     if page:
@@ -63,6 +71,22 @@ def prove(
         from compass_ros.proof import rivals_table
 
         rivals_table.write_page(page, theirs, found)
+
+
+def _of_cells(cells: Iterable[str]) -> tuple[str, ...]:
+    """Suites of other engines by cells."""
+    from compass_ros.errors import ConfigError, nearest
+    from compass_ros.proof.one_world import FOREIGN, SUITES
+
+    of = {SUITES[name].cell: name for name in FOREIGN}
+    out: list[str] = []
+    for cell in cells:
+        if cell != "all" and cell not in of:
+            raise ConfigError(
+                f"--cell {cell}: has no worlds from another engine; known: all, {', '.join(of)}{nearest(cell, of)}"
+            )
+        out += FOREIGN if cell == "all" else [of[cell]]
+    return tuple(dict.fromkeys(out))
 
 
 def _tell(key: Key, line: Line, done: int, total: int) -> None:
@@ -116,10 +140,10 @@ def _print(title: str, among: list[Line]) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    from compass_ros.proof.statistics import table
+    from compass_ros.proof.page import rows_of
 
     shown = Table("", "to reach", "reached", "95 % interval", "of", "", title=title)
-    for row in table(among):
+    for row in rows_of(among):
         verdict = {True: "yes", False: "no", None: ""}[row.reached]
         shown.add_row(escape(row.what), row.bar, row.value, row.interval, row.count, verdict)
     Console().print(shown)

@@ -7,11 +7,12 @@ in all of them (`kernels.py`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from compass_ros.discovery.evidence import evidences, log_sum
+from compass_ros.discovery.evidence import Tangent, evidences, log_sum
 from compass_ros.discovery.kernels import features_of, of_sizes, shared
 from compass_ros.discovery.response import Response
 from compass_ros.discovery.settings import FREE, MEMORY_S, RHO, RHO_PRIOR
@@ -87,3 +88,17 @@ def with_law(response: Response, sizes: Floats) -> tuple[float, float]:
     each = np.array(logs) + np.log(RHO_PRIOR) - np.log(len(logs))
     total = log_sum(each.ravel())
     return total, float(np.exp(each - total).sum(axis=0) @ np.array(RHO))
+
+
+def to_first_order(response: Response, sizes: Floats, columns: Sequence[Floats]) -> list[float]:
+    """Rise of the log evidence of a model with laws by one law more, for each (E, D, a) columns of such a one.
+
+    `sizes`: as in `with_law`, of the laws that the model has; the discrepancy stays theirs.
+    """
+    spreads = [spread(response, rho * sizes) for rho in RHO]
+
+    def of(tangent: Tangent) -> float:
+        return log_sum(np.array([f.log for f in evidences(tangent, spreads)]) + np.log(RHO_PRIOR))
+
+    alone = of(response.tangent)
+    return [of(response.tangent.more(c, np.zeros(c.shape[2]))) - alone for c in columns]

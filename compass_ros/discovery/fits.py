@@ -169,7 +169,7 @@ def whole(parent: Hypothesis, begun: Begun) -> Hypothesis:
     if robust > parent.fit.robust:  # what these episodes did not hold is far off
         point = minimise(likelihood, point, free, FEW, robust, 3.0, steps=steps, fresh=False).point
     fit = minimise(likelihood, point, free, FEW, parent.fit.robust, _SLIGHT, steps=steps)
-    return Hypothesis((*parent.laws, *begun.laws), simulator, likelihood, fit)
+    return Hypothesis((*parent.laws, *begun.laws), simulator, likelihood, fit, without=parent.bare)
 
 
 def finished(hypothesis: Hypothesis) -> Hypothesis:
@@ -196,4 +196,4 @@ def without(model: Hypothesis, laws: Sequence[Attached]) -> Hypothesis:
     point = replace(model.fit.point, values=model.fit.point.values[at], cost=np.inf)
     free = np.flatnonzero(np.isin(at, model.fit.free))
     fit = minimise(likelihood, point, free, FEW, model.fit.robust, _SLIGHT)
-    return Hypothesis(tuple(kept), simulator, likelihood, fit)
+    return Hypothesis(tuple(kept), simulator, likelihood, fit, without=model.bare)

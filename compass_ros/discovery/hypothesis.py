@@ -34,6 +34,8 @@ class Hypothesis:
     fit: Fit
     near: Response | None = None
     """The response of a fit nearby, whose pushes are taken for this one's; None: they are taken at this fit."""
+    without: Floats | None = None
+    """(E, F, C) what the simulator without laws leaves at its own fit [sigma]; None: this is it."""
 
     @property
     def name(self) -> str:
@@ -50,35 +52,34 @@ class Hypothesis:
             return respond(self.simulator, self.likelihood, self.fit)
         return replace(self.near, simulator=self.simulator, likelihood=self.likelihood, fit=self.fit)
 
+    @property
+    def bare(self) -> Floats:
+        """(E, F, C) what the simulator without laws leaves at its own fit [sigma]."""
+        return self.fit.linear.residual if self.without is None else self.without
+
     @cached_property
     def sizes(self) -> Floats:
         """(S,) rms of its laws along the fitted motion: accelerations, and errors of signals.
 
-        What acts on contacts or commands counts as a push that moves the recordings as much as it does.
+        What acts on contacts, commands or signals counts as what moves the recordings as much as the laws do when all
+        parameters have taken their best values with them and without: a stiffer wall beside a softer ball is nothing.
         """
         response, squared = self.response, np.zeros(len(self.response.unit))
+        moved = self.bare - self.fit.linear.residual
+        channels = set()
         for attached, own in self.own():
             if attached.effect.scattered:
                 continue  # each episode has its own number of it: no form that could be wrong
             if response.follows(attached):
                 pushed = response.accelerations(attached, self.fit.point.values[own])
                 squared += np.mean(pushed**2, axis=(0, 1))
-                continue
-            moved = self._moved(own, attached)
-            if attached.effect.channel == "sensing":
-                squared[len(response.site_of) :] += np.mean((moved * self.likelihood.sigma) ** 2, axis=(0, 1))
             else:
-                squared += self._as_push(moved) ** 2
+                channels.add("sensing" if attached.effect.channel == "sensing" else "motion")
+        if "sensing" in channels:
+            squared[len(response.site_of) :] += np.mean((moved * self.likelihood.sigma) ** 2, axis=(0, 1))
+        if "motion" in channels:
+            squared += self._as_push(moved) ** 2
         return np.sqrt(squared)
-
-    def _moved(self, own: slice, attached: Attached) -> Floats:
-        """(E, F, C) what a law does to the recordings [sigma]."""
-        values, point = self.fit.point.values.copy(), self.fit.point
-        values[own] = np.where(attached.amplitudes, 0.0, values[own])
-        episodes = np.arange(len(self.likelihood.inputs))
-        tiled = np.tile(values, (len(episodes), 1))
-        without = self.likelihood.residual(tiled, self.likelihood.inputs + point.launch, episodes)
-        return without - self.fit.linear.residual
 
     def _as_push(self, moved: Floats) -> Floats:
         """(S,) accelerations, each in proportion to its motion's, that move the recordings together as much."""

@@ -71,7 +71,7 @@ def with_scatter(parent: Hypothesis, ranked: Ranked) -> Hypothesis:
         likelihood, point = _spread(likelihood, point, spread)
         fit = minimise(likelihood, point, parent.fit.free, ITERATIONS, parent.fit.robust, 1.0)
         point, spread = fit.point, found_spread(likelihood, fit)
-    return Hypothesis((*parent.laws, attached), simulator, likelihood, fit)
+    return Hypothesis((*parent.laws, attached), simulator, likelihood, fit, without=parent.bare)
 
 
 def found_spread(likelihood: Likelihood, fit: Fit) -> float:

@@ -14,6 +14,7 @@ from math import log
 import numpy as np
 
 from compass_ros.discovery.candidates import Candidate
+from compass_ros.discovery.discrepancy import to_first_order
 from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.fits import Begun, finished, from_parent, race, telling, whole, without
@@ -164,12 +165,24 @@ def _widen(known: Known, best: Hypothesis, ranked: Sequence[Ranked], called: boo
     They are fitted to some episodes, and the best of them to all.
     """
     rows = telling(best)
-    tried = promising(ranked, best)[:RACED]
+    tried, few = promising(ranked, best)[:RACED], len(rows) < len(best.likelihood.inputs)
+    if best.laws and not few:
+        tried = [r for r, odds in zip(tried, beside(best, tried, known.prior), strict=True) if odds > 0]
     known.take(with_scatter(best, r) for r in tried if r.candidate.attached.effect.scattered)
     begun = [from_parent(best, r, rows, STEPS) for r in tried if not r.candidate.attached.effect.scattered]
-    if called:
+    if called and few:  # what takes all episodes to tell hardly bends a fit
         begun += race(best, cold_starts(ranked, best), rows)
     known.take(whole(best, one) for one in probable(begun, known.prior))
+
+
+def beside(model: Hypothesis, ranked: Sequence[Ranked], prior: Prior) -> list[float]:
+    """Log odds, to first order, of a model with one law more against the model with its discrepancy."""
+    rises = to_first_order(model.response, model.sizes, [r.columns for r in ranked])
+    scattered = [r.candidate.attached.effect.scattered for r in ranked]
+    return [
+        (r.gain if chance else rise) + prior.of_laws([r.candidate.name])
+        for r, rise, chance in zip(ranked, rises, scattered, strict=True)
+    ]
 
 
 def probable(begun: Sequence[Begun], prior: Prior) -> list[Begun]:

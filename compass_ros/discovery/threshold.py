@@ -62,10 +62,11 @@ def _largest_odds(
     spreads = [spread(response, size) for size in free_sizes(response)]
     by_size = np.stack([Factored(centred, tangent.normal, s).logs(last, squares) for s in spreads])
     best = np.logaddexp.reduce(by_size - np.log(len(spreads)), axis=0) - plain + PRIOR_UNKNOWN
-    p = tangent.parameters.shape[2]
+    p, own = tangent.parameters.shape[2], tangent.own.shape[2]
+    narrow = replace(centred, pushes=centred.pushes[:, :, :0])  # a law alone has no discrepancy here
     for one, prior in zip(ranked, priors, strict=True):
-        wider = centred.more(one.columns, np.zeros(one.columns.shape[2]))
-        more = np.concatenate([last[:, :p], products(one.columns), last[:, p:]], axis=1)
+        wider = narrow.more(one.columns, np.zeros(one.columns.shape[2]))
+        more = np.concatenate([last[:, :p], products(one.columns), last[:, p : p + own]], axis=1)
         best = np.maximum(best, Factored(wider, wider.normal, None).logs(more, squares) - plain + prior)
     return np.asarray(best)
 

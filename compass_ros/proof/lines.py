@@ -27,7 +27,7 @@ METHOD = (
     "types.py",
     "config.py",
 )
-WORLDS = ("concealed", "cells", "proof/one_world.py")
+WORLDS = ("concealed", "worlds", "cells", "proof/one_world.py")
 
 
 @dataclass(frozen=True)

@@ -89,17 +89,16 @@ def _set(explanations: Sequence[Json], alpha: float) -> list[Json]:
 
 
 def _right(names: Sequence[str], kind: str, laws: Sequence[Json]) -> bool:
-    """Whether an explanation is what is missing: each law by a member of its own class, and no other one.
+    """Whether an explanation is what is missing: each law by members of its own class, and no other names.
 
     Laws that are faint may be left out. What lies outside of the vocabulary is `unknown`, or what its class allows.
     """
     left = list(names)
     for law in sorted(laws, key=lambda one: one["strength"], reverse=True):
-        own = next((name for name in left if name in law["class"]), None)
-        if own is not None:
-            left.remove(own)
-        elif law["strength"] >= FAINT:
+        own = [name for name in left if name in law["class"]]
+        if not own and law["strength"] >= FAINT:
             return False
+        left = [name for name in left if name not in own]
     return not left
 
 

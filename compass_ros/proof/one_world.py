@@ -44,8 +44,8 @@ SUITES: Mapping[str, Suite] = {
         *(Suite(cell, (), 720_000 + 10_000 * i, cell) for i, cell in enumerate(MODULES)),
     )
 }
-"""main: the mix of the table. small: effects of 0.5 mm. tracker: a tracker's noise. like: the library's formulas. Of other
-engines (`worlds/`): table, and one suite for each other cell by its name."""
+"""main: the mix of the table. small: effects of 0.5 mm. tracker: a tracker's noise. like: the library's formulas. Of
+other engines (`worlds/`): table, and one suite for each other cell by its name."""
 FOREIGN = ("table", *MODULES)
 """Suites of other engines."""
 

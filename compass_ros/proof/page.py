@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from compass_ros.proof.lines import Line, counted
+from compass_ros.proof.one_world import FOREIGN
+from compass_ros.proof.scenes_table import rows as of_scenes
 from compass_ros.proof.statistics import Row, table
 from compass_ros.reporting.markdown import markdown_table, replace_between
 
@@ -21,15 +23,24 @@ def groups(found: Iterable[Line]) -> Mapping[tuple[str, str], list[Line]]:
     return dict(sorted(out.items()))
 
 
-def markdown(found: Iterable[Line]) -> str:
+def markdown(found: Collection[Line]) -> str:
     """A section for each suite and method, with what made it and every world that came out wrong."""
     parts = []
     for (suite, method), among in groups(found).items():
         commits = ", ".join(sorted({str(line["commit"]) for line in among}))
         parts.append(f"### {suite}, method {method}: {counted(among)} (commit {commits})\n")
-        parts.append(_table(table(among)))
+        parts.append(_table(rows_of(among)))
         parts.append(_wrong(among))
+    foreign = [line for line in found if line["suite"] in FOREIGN]
+    if foreign:
+        parts.append(f"### worlds from other engines, all scenes: {counted(foreign)}\n")
+        parts.append(_table(rows_of(foreign)))
     return "\n".join(parts)
+
+
+def rows_of(among: Sequence[Line]) -> list[Row]:
+    """The table of the worlds of one suite, or of several from other engines."""
+    return of_scenes(among) if among and among[0]["suite"] in FOREIGN else table(among)
 
 
 def _table(rows: Sequence[Row]) -> str:
@@ -54,6 +65,6 @@ def _wrong(among: Sequence[Line]) -> str:
     return markdown_table(("true", "said instead", "worlds"), rows) + "\n"
 
 
-def write_page(path: Path, found: Iterable[Line]) -> None:
+def write_page(path: Path, found: Collection[Line]) -> None:
     """Replace what stands between the markers. Raises ConfigError where the page has none."""
     replace_between(path, BEGIN, END, markdown(found))

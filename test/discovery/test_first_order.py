@@ -40,7 +40,7 @@ def plain(simulator: Simulator, likelihood: Likelihood) -> Hypothesis:
     [
         ("coulomb_friction", [2e-4], 0.1),
         ("quadratic_drag", [2e-4], 0.1),
-        ("spring", [2e-3, 0.3], 0.2),
+        ("spring", [2e-3, 0.3, 0.0], 0.2),
         ("asymmetric_friction", [2e-4], 0.1),
         ("stribeck_friction", [3e-4, 1.0], 0.4),
     ],
@@ -50,7 +50,7 @@ def test_a_small_law_of_force_is_found_with_its_numbers(
 ) -> None:
     model, candidate = planted(tmp_path, name, numbers)
     best = FirstOrder(model.response).ranked(candidate)[0]
-    assert best.numbers == pytest.approx(numbers, rel=within)
+    assert best.numbers[:2] == pytest.approx(numbers[:2], rel=within)  # a short way says nothing of a spring's lever
     # what it gains is what its columns gain as parameters
     tangent = model.response.tangent
     wider = tangent.more(best.columns, np.zeros(best.columns.shape[2]))

@@ -37,7 +37,7 @@ def said(cell_of: Path, laws: Sequence[str], numbers: Sequence[float], force: fl
         ("stribeck_friction", [0.15, 1.0], 1.0),
         ("stribeck_friction", [0.15, 3.0], 1e-3),
         ("quadratic_drag", [0.02], 1.0),
-        ("spring", [1.0, 0.4], 1.0),
+        ("spring", [1.0, 0.4, 0.0], 1.0),
         ("actuation_delay", [0.03], 1.0),
     ],
 )
@@ -46,6 +46,8 @@ def test_a_law_on_a_servo_is_named_with_its_size(tmp_path: Path, law: str, numbe
     assert mismatch.verdict == "named", mismatch.sentence
     assert [e.name for e in mismatch.effects] == [law]
     for planted, (name, found) in zip(numbers, mismatch.effects[0].parameters.items(), strict=True):
+        if name == "lever":
+            continue  # a short way says nothing of it
         unit = force if found.unit.startswith("N") else 1.0
         assert found.value / unit == pytest.approx(planted, rel=0.05), name
         assert abs(found.value) > 2 * found.std
@@ -77,7 +79,7 @@ def test_nothing_is_missing_from_a_servo_that_has_wrong_numbers(tmp_path: Path) 
 
 
 def test_two_laws_on_a_servo_are_both_named(tmp_path: Path) -> None:
-    mismatch = said(tmp_path, ["coulomb_friction", "spring"], [0.08, 1.0, 0.4])
+    mismatch = said(tmp_path, ["coulomb_friction", "spring"], [0.08, 1.0, 0.4, 0.0])
     assert {e.name for e in mismatch.effects} == {"coulomb_friction", "spring"}, mismatch.sentence
 
 

@@ -1,8 +1,9 @@
 """A steady stream of air around a body in space.
 
 F = m a |w - v| (w - v) / speed^2, a = |(acceleration_x, acceleration_y, acceleration_z)| what the body at rest feels, w
-the velocity of the air, `speed` in that direction. Source: drag equation with the velocity relative to the air; a fast
-stream is a constant push. `crosswind` in three dimensions.
+the velocity of the air, `speed` in that direction; in a scene that has air at rest, + m a |v| v / speed^2: what the
+stream adds to that. Source: drag equation with the velocity relative to the air; a fast stream is a constant push.
+`crosswind` in three dimensions.
 """
 
 from __future__ import annotations
@@ -19,10 +20,11 @@ def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
 
 
 def _on_body(size: BodySize) -> tuple[Quantity, ...]:
-    """Air that is much slower than the body is still air, which `quadratic_drag` is about."""
+    """Air that is much slower than the body is still air, which `quadratic_drag` is about. A search begins with a fast
+    stream: the push is nearly in proportion to the acceleration there, whatever its direction."""
     most, scale, v = LARGEST * size.acceleration, MODEST * size.acceleration, size.speed
     pushes = [Quantity(f"acceleration_{axis}", "m/s^2", -most, most, scale) for axis in "xyz"]
-    return (*pushes, Quantity("speed", "m/s", 0.3 * v, 30.0 * v, v, amplitude=False, start=2.0 * v))
+    return (*pushes, Quantity("speed", "m/s", 0.3 * v, 30.0 * v, v, amplitude=False, start=10.0 * v))
 
 
 EFFECT = Effect(

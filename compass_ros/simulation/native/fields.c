@@ -96,10 +96,11 @@ void compass_forget(const mjModel* model) {
 // What a force may depend on: position [m] and velocity [m/s] in the world (JOINT: angle and rate in [0]), inertia.
 // Numbers of a joint are forces and torques themselves: its mass is 1 and it has no weight. `give` is the speed that a
 // unit force takes from it within a step [m/s per N]; 0 for bodies. `load`: what drives a joint. Of a body in space also
-// its spin and gravity, in the world.
+// its spin and gravity, in the world; whether the scene has air of its own.
 typedef struct {
   double x, y, vx, vy, vz, speed, mass, weight, time, give, load;
   double spin[3], gravity[3];
+  int air;
 } State;
 
 typedef struct {
@@ -216,9 +217,10 @@ static Force evaluate(const Term* term, const State* s) {
     case WIND: {           // p: acceleration at rest x, y, z, speed of the air
       double a = norm3(p);
       if (a == 0) return (Force){0, 0, 0};
-      double u[3] = {p[3] * p[0] / a - s->vx, p[3] * p[1] / a - s->vy, p[3] * p[2] / a - s->vz};
-      double k = s->mass * a * norm3(u) / (p[3] * p[3]);
-      return (Force){k * u[0], k * u[1], k * u[2]};
+      double v[3] = {s->vx, s->vy, s->vz}, u[3] = {p[3] * p[0] / a - v[0], p[3] * p[1] / a - v[1], p[3] * p[2] / a - v[2]};
+      double k = s->mass * a / (p[3] * p[3]), moving = norm3(u), resting = s->air ? norm3(v) : 0;
+      return (Force){k * (moving * u[0] + resting * v[0]), k * (moving * u[1] + resting * v[1]),
+                     k * (moving * u[2] + resting * v[2])};
     }
     case BUOYANCY: {       // p: share of the weight
       double k = -s->mass * p[0];
@@ -282,6 +284,7 @@ static void push(const mjModel* m, mjData* d, const Term* term) {
       s.vz = velocity[2];
       memcpy(s.spin, d->cvel + 6 * term->id, sizeof s.spin);
       memcpy(s.gravity, m->opt.gravity, sizeof s.gravity);
+      s.air = m->opt.density > 0;
     } else {
       double rate = term->object == PLANAR_YAW ? v[2] : 0;
       for (int k = 0; k < 2; k++) arm[k] = com[k] - d->xpos[3 * term->id + k];
