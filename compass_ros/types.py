@@ -79,8 +79,8 @@ Phase = Literal["start", "free", "contact", "rest", "all", "strike", "wall_conta
 words, and those of the first version of result.json."""
 GENERAL: Mapping[str, Phase] = {"strike": "start", "wall_contact": "contact", "object_contact": "contact"}
 """Words that a result has for a table's."""
-SiteWord = Literal["joint", "body", "geom_pair", "body_pair", "actuator", "signal"]
-"""A geom pair may be all contacts of a scene, or those of one wall."""
+SiteWord = Literal["joint", "body", "geom_pair", "body_pair", "actuator", "signal", "field"]
+"""A geom pair may be all contacts of a scene, or those of one wall. A field: a number of the scene."""
 Verdict = Literal["none", "named", "ambiguous", "unknown", "fit_failed", "data_bad", "not_evaluated"]
 
 

@@ -30,7 +30,8 @@ def table() -> str:
         lines += [f"### {channel}", "", "| name | acts on | formula | parameters: bounds [unit] |", "|---|---|---|---|"]
         for name, effect in EFFECTS.items():
             if effect.channel == channel:
-                sized = _sized(effect)
+                sized = {kind: "as unsure as the number is: `deviation`" for kind in effect.on if effect.apart}
+                sized = sized or _sized(effect)
                 absolute = [] if set(effect.on) <= set(sized) else [_described(q) for q in effect.quantities]
                 parameters = absolute + list(dict.fromkeys(sized.values()))
                 row = (f"`{name}`", in_words(effect.on), formula(name).replace("|", "&#124;"), "<br>".join(parameters))

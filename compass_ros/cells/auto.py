@@ -49,11 +49,11 @@ def automatic(
     used = set(names)
     out = []
     for candidate in candidates(scene):
-        if _places(scene, candidate, where) & taken:
+        if places(scene, candidate, where) & taken:
             continue
         name = candidate.name if candidate.name not in used else f"{candidate.name}_{candidate.field.partition('[')[0]}"
         used.add(name)
-        out.append(_parameter(candidate, name))
+        out.append(specified(candidate, name))
     return tuple(out)
 
 
@@ -89,14 +89,15 @@ def changed(a: mujoco.MjModel, b: mujoco.MjModel) -> Iterator[Place]:
         yield from ((f"opt.{option}", int(place)) for place in np.flatnonzero(before != after))
 
 
-def _places(scene: mujoco.MjModel, candidate: Candidate, where: str) -> set[Place]:
+def places(scene: mujoco.MjModel, candidate: Candidate, where: str) -> set[Place]:
     """Numbers that a candidate writes; a turn the whole quaternion, a moment all inertias, a drive its gain."""
     name, bracket, index = candidate.field.partition("[")
     found = entry(scene, _WRITES.get(name, name + bracket + index), candidate.of, where)
     return {(found.array, int(place)) for place in found.flat}
 
 
-def _parameter(candidate: Candidate, name: str) -> ParameterSpec:
+def specified(candidate: Candidate, name: str) -> ParameterSpec:
+    """A field as a parameter of a cell."""
     return ParameterSpec(
         name=name,
         default=candidate.value,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from compass_ros.discovery.unlisted import unlisted
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached, Effect, Quantity
 from compass_ros.simulation.sites import DRIVES, JOINTS, PLANAR, Site, SiteKind, names_of
@@ -79,6 +80,7 @@ def candidates(simulator: Simulator, values: Floats, inputs: Floats, time_s: Flo
             out.extend(_on_drives(effect, simulator, visited))
         elif simulator.accepts(effect, ()):
             out.append(Attached(effect, ()))
+    out.extend(unlisted(simulator, values, visited))
     return tuple(Candidate(attached) for attached in out)
 
 

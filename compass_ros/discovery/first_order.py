@@ -196,12 +196,16 @@ class FirstOrder:
     # --- laws of contacts, commands and signals
 
     def _rolled_out(self, candidate: Candidate) -> list[Ranked]:
-        """With steps that are doubled until they do twice as much: limits do nothing, then a lot."""
+        """With steps that are doubled until they do twice as much: limits do nothing, then a lot.
+
+        They are taken downwards where there is no room above zero.
+        """
         low, high, scale = _bounds(candidate)
         amplitudes, quantities = candidate.attached.amplitudes, candidate.attached.effect.quantities
         found: list[Ranked] = []
-        steps, before = scale, 0.0
-        while np.all(steps <= high):
+        up = high >= scale
+        steps, most, before = np.where(up, scale, -scale), np.where(up, high, -low), 0.0
+        while np.all(np.abs(steps) <= most):
             settings = np.tile([0.0 if q.amplitude else q.start for q in quantities], (len(steps), 1))
             settings[:, amplitudes] = np.diag(steps)
             change = self.response.changes(candidate.attached, settings)

@@ -46,6 +46,8 @@ class Prior:
 
     sites: dict[str, int]
     """Choices of sites by name of law: each set of single ones with a size on each, and those with one for all."""
+    apart: frozenset[str] = frozenset()
+    """Laws that are another one on each site: such a site is a choice, a set of them is several laws."""
 
     @staticmethod
     def of(candidates: Sequence[Candidate]) -> Prior:
@@ -53,7 +55,9 @@ class Prior:
         for c in candidates:
             (singles if len(c.objects) <= 1 else shared)[c.name] += 1
         names = dict.fromkeys(c.name for c in candidates)
-        return Prior({name: 2 ** singles[name] - 1 + shared[name] for name in names})
+        apart = frozenset(c.name for c in candidates if c.attached.effect.apart)
+        choices = {name: singles[name] if name in apart else 2 ** singles[name] - 1 for name in names}
+        return Prior({name: choices[name] + shared[name] for name in names}, apart)
 
     @property
     def price(self) -> float:
@@ -61,8 +65,12 @@ class Prior:
         return max(self.of_laws([name]) for name in self.sites)
 
     def of_laws(self, names: Iterable[str]) -> float:
-        """Each law counts once, whatever its sites."""
-        return sum(PRIOR_LAW - log(len(self.sites) * self.sites[name]) for name in dict.fromkeys(names))
+        """Each law counts once, whatever its sites; one that is another on each of them by its sites."""
+        counted = Counter(names)
+        return sum(
+            (PRIOR_LAW - log(len(self.sites) * self.sites[name])) * (count if name in self.apart else 1)
+            for name, count in counted.items()
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +106,8 @@ def rank(first: FirstOrder, candidates: Sequence[Candidate]) -> list[Ranked]:
     moving, alone = first.response.simulator.moving, dict[str, list[Ranked]]()
     for one in found:
         own = [moving[name].kind for name in one.candidate.objects if name in moving]
-        if len(one.candidate.objects) == 1 and one.gain > 0 and not any(kind in PLANAR for kind in own):
+        several_alike = not one.candidate.attached.effect.apart and not any(kind in PLANAR for kind in own)
+        if len(one.candidate.objects) == 1 and one.gain > 0 and several_alike:
             alone.setdefault(one.candidate.name, []).append(one)
     several = (first.together(singles) for singles in alone.values() if len(singles) > 1)
     return sorted([*found, *of_chance, *(one for one in several if one)], key=lambda f: -f.gain)

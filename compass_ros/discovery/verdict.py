@@ -17,7 +17,7 @@ from compass_ros.discovery.next_shot import next_experiment
 from compass_ros.discovery.numerics import with_numerics
 from compass_ros.discovery.search import Found
 from compass_ros.discovery.where import whereabouts
-from compass_ros.discovery.words import DEPENDS, errors, place, value_of, where_of
+from compass_ros.discovery.words import DEPENDS, errors, missing, place, value_of, where_of
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import rms_distance
 from compass_ros.simulation.sites import PLANAR, Site, word_of
@@ -137,16 +137,16 @@ class Judge:
         first = next(own for _, own in best.own())
         where = where_of(best.laws, values[first], self.simulator.movers())
         following = ""
-        lacks = " and ".join(dict.fromkeys(a.effect.sentence for a in best.laws))
+        lacks = missing(best.laws, [values[own] for _, own in best.own()], self.simulator.places)
         if verdict == "ambiguous":
             following = next_experiment(self.simulator, best.likelihood, models, self.seed).sentence
-            lacks = "one of these: " + "; ".join(dict.fromkeys(m.name for m in models))
+            lacks = "the simulator lacks one of these: " + "; ".join(dict.fromkeys(m.name for m in models))
         names = [a.effect.name for a in best.laws]
         sizes = "; ".join(
             value_of(f, a, names.count(a.effect.name) > 1) for f, a in zip(findings, best.laws, strict=True)
         )
         said = errors(self._before, after, self._floor, self.simulator.unit)
-        sentence = f"{place(where, self._flat)}, the simulator lacks {lacks}; {sizes}; {said}."
+        sentence = f"{place(where, self._flat)}, {lacks}; {sizes}; {said}."
         sites = self.simulator.places.sites(best.laws[0].objects, best.laws[0].effect.on)
         return self._said(verdict, sentence, _on(where, sites, best.laws[0].objects), findings, following, best)
 

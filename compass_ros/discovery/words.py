@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from compass_ros.discovery.hypothesis import ERROR_BARS
 from compass_ros.simulation.effects import Attached
+from compass_ros.simulation.sites import Places
 from compass_ros.types import Channel, DependsOn, EffectFinding, Floats, Phase, Region, Unit, Where
 
 PHASE: dict[str, Phase] = {
@@ -36,7 +37,8 @@ def where_of(laws: Sequence[Attached], numbers: Floats, movers: Sequence[str]) -
     attached = laws[0]
     effect = attached.effect
     phase = PHASE.get(effect.name, OF_CHANNEL[effect.channel])
-    objects = dict.fromkeys(name for law in laws if law.effect.name == effect.name for name in law.objects)
+    named = (name for law in laws if law.effect.name == effect.name for name in law.objects)
+    objects = dict.fromkeys(name.partition("@")[0] for name in named)
     told = bool(objects) and set(objects) != set(movers)
     one = " and ".join(objects) if told else "all"
     names = [q.name for q in effect.quantities]
@@ -72,6 +74,25 @@ DEPENDS: dict[DependsOn | None, str] = {
     "time": ", and depends neither on place nor on velocity alone",
 }
 """What a difference that no law explains is a function of."""
+
+
+def missing(laws: Sequence[Attached], numbers: Sequence[Floats], places: Places) -> str:
+    """What the simulator lacks by some laws with (q,) numbers each, and which numbers of its scene are wrong."""
+    lacks = [a.effect.sentence for a in laws if a.effect.on != ("field",)]
+    fitted = zip(laws, numbers, strict=True)
+    wrong = [wrong_number(a, float(n[0]), places) for a, n in fitted if a.effect.on == ("field",)]
+    said = [f"the simulator lacks {' and '.join(dict.fromkeys(lacks))}"] if lacks else []
+    return ", and ".join([*said, *wrong])
+
+
+def wrong_number(attached: Attached, deviation: float, places: Places) -> str:
+    """'the scene's armature of elbow is wrong: 0.031 kg m^2 instead of 0.02'."""
+    (site,) = attached.sites(places)
+    of, _, what = site.name.split("@")
+    there = site.number.value if site.number else 0.0
+    unit = attached.effect.quantities[0].unit
+    found = f"{there + deviation:.3g}" + ("" if unit == "1" else f" {unit}")
+    return f"the scene's {what.replace('_', ' ')} of {of} is wrong: {found} instead of {there:.3g}"
 
 
 def value_of(finding: EffectFinding, attached: Attached, told: bool) -> str:

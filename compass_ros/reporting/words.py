@@ -77,6 +77,7 @@ SITES: Mapping[SiteWord, tuple[str, str]] = {
     "body_pair": ("pair of", "pairs of bodies"),
     "actuator": ("actuator", "actuators"),
     "signal": ("signal", "signals"),
+    "field": ("number", "numbers"),
 }
 """One of them before its name, and several."""
 

@@ -14,6 +14,8 @@ from typing import Literal
 import mujoco
 import numpy as np
 
+from compass_ros.cells.auto_rules import candidates
+from compass_ros.cells.candidate import Candidate
 from compass_ros.errors import nearest
 from compass_ros.types import SiteWord
 
@@ -36,6 +38,7 @@ SiteKind = Literal[
     "camera",
     "encoder",
     "sensor",
+    "field",
 ]
 """hinge, slide: a joint with one degree of freedom. planar: a body that slides along x and y of the world (and may turn
 about z); lying: one that gravity presses on what it slides on; table: one whose friction there is the cell's. body: any
@@ -43,7 +46,8 @@ other moving body. wall: a fixed geom in a pair. contacts: all of the scene. geo
 body_pair: two bodies of which one moves, or both. velocity_drive, position_drive,
 effort_drive, other_drive: an actuator by what it is told; tool_drive: velocity drives that move one tool along x and y
 of the world (and z), whose command is a vector. camera: tracked bodies as they are seen; encoder: what is measured of
-joints; sensor: other signals; each all of them, one by its name, or one of its numbers as `signal.number`."""
+joints; sensor: other signals; each all of them, one by its name, or one of its numbers as `signal.number`. field: a
+number of the scene, `object@type@field`."""
 
 JOINTS: tuple[SiteKind, ...] = ("hinge", "slide")
 LYING: tuple[SiteKind, ...] = ("table", "lying")
@@ -54,6 +58,10 @@ SINGLE_DRIVES: tuple[SiteKind, ...] = ("velocity_drive", "position_drive", "effo
 DRIVES: tuple[SiteKind, ...] = ("tool_drive", *SINGLE_DRIVES)
 SIGNALS: tuple[SiteKind, ...] = ("camera", "encoder", "sensor")
 PAIRS: tuple[SiteKind, ...] = ("geom_pair", "body_pair")
+NUMBERS = frozenset({"dof_armature", "dof_damping", "dof_frictionloss", "jnt_stiffness", "body_mass", "body_ipos",
+                     "body_moment", "body_pos", "servo_gain", "geom_friction"})  # fmt: skip
+"""Fields that a scene may have wrong: what a joint resists with, a link's mass, centre, inertia and place, a servo's
+gain, the friction of a geom. A share of a motor's torque is what `gain_error` says."""
 
 _WORDS: dict[SiteKind, str] = {
     "table": "body on the cell's table",
@@ -67,6 +75,7 @@ _WORDS: dict[SiteKind, str] = {
     "camera": "tracked body",
     "encoder": "measured joint",
     "sensor": "other sensor",
+    "field": "number",
 }
 _SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
 ONE_DOF = (_HINGE, _SLIDE)
@@ -88,6 +97,8 @@ class Site:
     """Of one signal: what it measures."""
     units: tuple[str, ...] = ()
     """Of one signal: of each of its columns."""
+    number: Candidate | None = None
+    """Of a number of the scene: its field, what the scene says it is, and how far off that may be."""
 
     @property
     def name(self) -> str:
@@ -168,7 +179,7 @@ class Places:
 
     def of(self, name: str, kinds: Collection[SiteKind]) -> Site | None:
         """What of one of these kinds has the name; a joint before a body called the same."""
-        found = (self.joint(name), self.body(name), self.wall(name), self.signal(name))
+        found = (self.joint(name), self.body(name), self.wall(name), self.signal(name), self.numbers.get(name))
         return next((site for site in found if site is not None and site.kind in kinds), None)
 
     def _joined(self, names: Sequence[str], kinds: Collection[SiteKind]) -> tuple[Site, ...]:
@@ -181,10 +192,17 @@ class Places:
         model = self.model
         joints = [self.joint(model.joint(i).name) for i in range(model.njnt)]
         bodies = [self.body(model.body(i).name) for i in range(1, model.nbody)]
-        found = [*joints, *bodies, *map(self.wall, self.walls), *self.drives, *self.signals]
+        numbers = self.numbers.values() if "field" in kinds else ()
+        found = [*joints, *bodies, *map(self.wall, self.walls), *self.drives, *self.signals, *numbers]
         named = list(names_of(site for site in found if site is not None and site.kind in kinds))
         named += [model.geom(i).name for i in range(model.ngeom) if "geom_pair" in kinds]
         return named + [model.body(i).name for i in range(model.nbody) if "body_pair" in kinds]
+
+    @cached_property
+    def numbers(self) -> dict[str, Site]:
+        """Numbers of the scene that say what moves and what moves it, by their names `object@type@field`."""
+        known = (c for c in candidates(self.model) if c.field.partition("[")[0] in NUMBERS)
+        return {one.name: Site("field", (one.name,), number=one) for one in known if "+" not in one.name}
 
     @cached_property
     def _measured(self) -> tuple[Site, ...]:
@@ -288,6 +306,8 @@ def word_of(kind: SiteKind) -> SiteWord:
         return "actuator"
     if kind in SIGNALS:
         return "signal"
+    if kind == "field":
+        return "field"
     return "body_pair" if kind == "body_pair" else "geom_pair"
 
 

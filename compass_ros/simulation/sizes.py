@@ -91,7 +91,7 @@ def joint_sizes(
         noises: Of the position of each joint [rad, m].
     """
     data = mujoco.MjData(model)
-    rows = [_moment(model, data) for _ in _moments(model, data, states, driven)]
+    rows = [_moment(model, data) for _ in moments(model, data, states, driven)]
     inertia, position, speed, gravity, drive = np.stack(rows, axis=1)  # (M, nv) each
     seconds = states.shape[1] * float(model.opt.timestep)
     out = {}
@@ -110,11 +110,11 @@ def joint_sizes(
 def largest_forces(model: mujoco.MjModel, states: Floats, driven: tuple[Floats | None, int]) -> Floats:
     """(nu,) the largest force of each actuator, by absolute value, in the moments of `joint_sizes`."""
     data = mujoco.MjData(model)
-    rows = [data.actuator_force.copy() for _ in _moments(model, data, states, driven)]
+    rows = [data.actuator_force.copy() for _ in moments(model, data, states, driven)]
     return np.asarray(np.abs(rows).max(axis=0))
 
 
-def _moments(
+def moments(
     model: mujoco.MjModel, data: mujoco.MjData, states: Floats, driven: tuple[Floats | None, int]
 ) -> Iterator[None]:
     """Brings `data` into SAMPLES moments of each episode, one after the other."""

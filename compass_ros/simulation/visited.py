@@ -7,11 +7,15 @@ from functools import cached_property
 
 import numpy as np
 
+from compass_ros.simulation.balance import Balance
 from compass_ros.simulation.extents import BodySize, Path, body_size, paths, standing
 from compass_ros.simulation.simulator import Simulator
 from compass_ros.simulation.sites import JOINTS, Site
 from compass_ros.simulation.sizes import DriveSize, JointSize, command_unit, joint_sizes, largest_forces
 from compass_ros.types import Floats
+
+BALANCED = 4
+"""Episodes, of all, in which it is asked what numbers of the scene do: a budget."""
 
 
 class Visited:
@@ -44,6 +48,13 @@ class Visited:
             name: body_size(model, site, found[name], seconds, noise, name in turning) if site else standing(model)
             for name, site in sites.items()
         }, found
+
+    def balance(self) -> Balance:
+        """What numbers of the scene do in some of the episodes."""
+        states, (controls, parts) = self._states
+        some = slice(None, None, max(len(states) // BALANCED, 1))
+        own = None if controls is None else controls[some]
+        return Balance(self._simulator.written(self._values), states[some], (own, parts))
 
     def drive_forces(self) -> Floats:
         """(nu,) the largest force of each actuator."""

@@ -89,6 +89,8 @@ class Effect:
     """Its quantities on one signal, from what that shows; None: `quantities`."""
     rotor: bool = False
     """Whether it acts between a joint and its motor, which the scene is then compiled with (`cells/rotors.py`)."""
+    apart: bool = False
+    """Whether it is another law on each of its sites, so that it is never the same one on several."""
     by_name: bool = False
     """Whether it acts on what is named alone, and means nothing for all of a kind."""
     unable: Callable[[mujoco.MjModel, Site], str] | None = None
@@ -137,19 +139,26 @@ class Effect:
 
 
 RESTORED = (
+    "actuator_biasprm",
     "actuator_forcelimited",
     "actuator_forcerange",
+    "actuator_gainprm",
     "actuator_trnid",
     "body_inertia",
     "body_ipos",
     "body_iquat",
     "body_mass",
+    "body_pos",
     "body_sameframe",
     "dof_armature",
+    "dof_damping",
+    "dof_frictionloss",
+    "geom_friction",
     "geom_pos",
     "geom_quat",
     "geom_sameframe",
     "geom_solref",
+    "jnt_stiffness",
     "pair_solref",
     "sensor_objid",
     "tendon_damping",

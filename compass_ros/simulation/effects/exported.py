@@ -16,6 +16,7 @@ from compass_ros.config import read_yaml
 from compass_ros.errors import ConfigError, shown
 from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.effect import Effect
+from compass_ros.simulation.effects.parameter import in_unit
 from compass_ros.simulation.effects.registry import effect
 from compass_ros.simulation.extents import unit_sizes
 from compass_ros.simulation.sites import SiteKind
@@ -128,6 +129,8 @@ def _fitted(entry: _Entry, path: Path | str) -> FittedEffect:
 def _variants(entry: _Entry, path: Path | str) -> list[Effect]:
     """The effect as it can be on the kind of site that an entry speaks of: units depend on that."""
     kind = effect(entry.name)
+    if kind.apart:  # its unit is that of a number of the scene
+        return [in_unit(value.unit) for value in entry.values.values()] or [kind]
     if entry.on is None:
         return [kind]
     if entry.on not in kind.on:

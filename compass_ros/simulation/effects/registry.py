@@ -21,6 +21,7 @@ _NAMES = (
     *("torque_saturation", "rate_limit", "gain_error", "hysteresis", "servo_dead_band"),
     *("camera_latency", "camera_scale", "camera_rotation", "lens_distortion", "rolling_shutter", "tracking_lag"),
     *("clock_drift", "latency", "scale", "offset", "rotation", "eccentricity"),
+    "parameter",
 )
 EFFECTS: Mapping[str, Effect] = MappingProxyType(
     {name: import_module(f"compass_ros.simulation.effects.{name}").EFFECT for name in _NAMES}

@@ -21,7 +21,7 @@ NAMES = {
     "dynamics": "table_tilt viscous_drag quadratic_drag crosswind fan_field swirl point_attraction friction_patch "
     "friction_gradient anisotropic_friction stribeck_friction coulomb_friction magnus pulsating_lift spring "
     "asymmetric_friction load_dependent_friction cogging joint_elasticity backlash gravity_tilt payload wind buoyancy "
-    "pair_attraction tether",
+    "pair_attraction tether parameter",
     "contact": "rate_dependent_restitution tangential_impulse local_wall off_centre_mass friction_cone "
     "adhesion rolling_resistance",
     "actuation": "actuation_delay first_order_lag velocity_saturation dead_band heading_bias stroke_jitter "

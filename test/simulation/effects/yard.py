@@ -54,6 +54,7 @@ NEW: dict[str, tuple[str, ...]] = {
     "eccentricity": ("elbow",),
     "latency": ("shoulder",),
     "clock_drift": ("ball",),
+    "parameter": ("lower@dyna@mass",),
 }
 """A site here for each law off a table, and for those that can have one signal."""
 INPUTS = np.array([[0.7, 0.05, 0.4, -0.3], [-0.5, 0.08, -0.2, 0.6]])
