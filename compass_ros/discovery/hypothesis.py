@@ -61,6 +61,7 @@ class Hypothesis:
     def sizes(self) -> Floats:
         """(S,) rms of its laws along the fitted motion: accelerations, and errors of signals.
 
+        A force has its size along each line on which it could push a body: its direction may be as wrong as its size.
         What acts on contacts, commands or signals counts as what moves the recordings as much as the laws do when all
         parameters have taken their best values with them and without: a stiffer wall beside a softer ball is nothing.
         """
@@ -70,16 +71,26 @@ class Hypothesis:
         for attached, own in self.own():
             if attached.effect.scattered:
                 continue  # each episode has its own number of it: no form that could be wrong
-            if response.follows(attached):
-                pushed = response.accelerations(attached, self.fit.point.values[own])
-                squared += np.mean(pushed**2, axis=(0, 1))
+            if attached.effect.forces is not None and attached.effect.channel == "dynamics":
+                squared += np.mean(self._pushed(attached, own) ** 2, axis=(0, 1))
             else:
                 channels.add("sensing" if attached.effect.channel == "sensing" else "motion")
+        for group in response.groups():
+            squared[group] = squared[group].mean()
         if "sensing" in channels:
             squared[len(response.site_of) :] += np.mean((moved * self.likelihood.sigma) ** 2, axis=(0, 1))
         if "motion" in channels:
             squared += self._as_push(moved) ** 2
         return np.sqrt(squared)
+
+    def _pushed(self, attached: Attached, own: slice) -> Floats:
+        """(E, K, S) accelerations by a law of forces."""
+        values = self.fit.point.values
+        if self.response.follows(attached):
+            return self.response.accelerations(attached, values[own])
+        absent = values.copy()
+        absent[own] = np.where(attached.amplitudes, 0.0, values[own])
+        return self.response.at_once(values, absent)
 
     def _as_push(self, moved: Floats) -> Floats:
         """(S,) accelerations, each in proportion to its motion's, that move the recordings together as much."""

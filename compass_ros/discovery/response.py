@@ -16,6 +16,7 @@ from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.simulation.extents import along
 from compass_ros.simulation.kicks import Kicks, inertias, kicks
+from compass_ros.simulation.simulator import CHUNK
 from compass_ros.simulation.sites import JOINTS, PLANAR, Site
 from compass_ros.types import Floats, Ints
 
@@ -117,6 +118,33 @@ class Response:
         """(E, K, S) of a law of forces with (q,) numbers, along the fitted motion; zero of signals."""
         out = np.zeros((*self.states.shape[:2], len(self.unit)))
         out[:, :, self.pushed_by(attached)] = self.law(attached)(numbers)
+        return out
+
+    def at_once(self, values: Floats, other: Floats) -> Floats:
+        """(E, K, S) accelerations by which a step from the states of the moments differs with two (P,) sets of values;
+        zero of signals."""
+        states, controls = self.kicks.states, self.kicks.controls
+        flat = states.reshape(-1, states.shape[2])
+        driven = None if controls is None else controls.reshape(len(flat), 1, -1)
+        simulator, (first, second) = self.simulator, (np.tile(v, (len(flat), 1)) for v in (values, other))
+        after = [np.concatenate([simulator.play(v[i : i + CHUNK], flat[i : i + CHUNK],
+                                                None if driven is None else driven[i : i + CHUNK], 1)[0][:, 0]
+                                 for i in range(0, len(flat), CHUNK)]) for v in (first, second)]  # fmt: skip
+        model = simulator.physics.model
+        _, dofs = directions(simulator, self.sites)
+        change = (after[0] - after[1])[:, 1 + model.nq + dofs] / simulator.time_step
+        out = np.zeros((*states.shape[:2], len(self.unit)))
+        out[:, :, : len(dofs)] = change.reshape(*states.shape[:2], -1)
+        return out
+
+    def groups(self) -> list[Ints]:
+        """Directions in which one thing moves along a line: three of a body in space, two in the plane, one of a joint;
+        and turns of bodies, each by itself."""
+        out: list[Ints] = []
+        for n, site in enumerate(self.sites):
+            own = np.flatnonzero(self.site_of == n)
+            straight = len(own) if site.kind in JOINTS else 2 if site.kind in PLANAR else 3
+            out += [own[:straight], *(own[i : i + 1] for i in range(straight, len(own)))]
         return out
 
     def pushed_by(self, attached: Attached) -> Ints:

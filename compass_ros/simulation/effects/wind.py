@@ -1,9 +1,8 @@
 """A steady stream of air around a body in space.
 
-F = m a |w - v| (w - v) / speed^2, a = |(acceleration_x, acceleration_y, acceleration_z)| what the body at rest feels, w
-the velocity of the air, `speed` in that direction; in a scene that has air at rest, + m a |v| v / speed^2: what the
-stream adds to that. Source: drag equation with the velocity relative to the air; a fast stream is a constant push.
-`crosswind` in three dimensions.
+F = m coefficient (|w - v| (w - v) + |v| v), w = (wind_x, wind_y, wind_z) the velocity of the air: what a stream adds to
+the drag in air at rest, which the scene has, or `quadratic_drag`. Source: drag equation with the velocity relative to
+the air.
 """
 
 from __future__ import annotations
@@ -14,17 +13,19 @@ from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.simulation.sizes import LARGEST, MODEST
 from compass_ros.types import Floats
 
+_LIGHTEST = 0.01
+"""Drag over the larger of gravity and what turns the body: of a steel ball; a tenth is a football's."""
+
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
     return tuple(Term(Kind.WIND, site, numbers) for site in context.sites)
 
 
 def _on_body(size: BodySize) -> tuple[Quantity, ...]:
-    """Air that is much slower than the body is still air, which `quadratic_drag` is about. A search begins with a fast
-    stream: the push is nearly in proportion to the acceleration there, whatever its direction."""
-    most, scale, v = LARGEST * size.acceleration, MODEST * size.acceleration, size.speed
-    pushes = [Quantity(f"acceleration_{axis}", "m/s^2", -most, most, scale) for axis in "xyz"]
-    return (*pushes, Quantity("speed", "m/s", 0.3 * v, 30.0 * v, v, amplitude=False, start=10.0 * v))
+    most, v = size.acceleration / size.speed**2, size.speed
+    stream = [Quantity(f"wind_{axis}", "m/s", -LARGEST * v, LARGEST * v, MODEST * v) for axis in "xyz"]
+    low, high = _LIGHTEST * most, LARGEST * most
+    return (*stream, Quantity("coefficient", "1/m", low, high, 0.1 * most, amplitude=False, start=0.1 * most))
 
 
 EFFECT = Effect(
@@ -35,5 +36,4 @@ EFFECT = Effect(
     on=("body",),
     forces=_forces,
     on_body=_on_body,
-    superposes=False,
 )

@@ -96,11 +96,10 @@ void compass_forget(const mjModel* model) {
 // What a force may depend on: position [m] and velocity [m/s] in the world (JOINT: angle and rate in [0]), inertia.
 // Numbers of a joint are forces and torques themselves: its mass is 1 and it has no weight. `give` is the speed that a
 // unit force takes from it within a step [m/s per N]; 0 for bodies. `load`: what drives a joint. Of a body in space also
-// its spin and gravity, in the world; whether the scene has air of its own.
+// its spin and gravity, in the world.
 typedef struct {
   double x, y, vx, vy, vz, speed, mass, weight, time, give, load;
   double spin[3], gravity[3];
-  int air;
 } State;
 
 typedef struct {
@@ -214,13 +213,10 @@ static Force evaluate(const Term* term, const State* s) {
       Force f = tilted(s->gravity, p[0], p[1]);
       return (Force){s->mass * f.x, s->mass * f.y, s->mass * f.z};
     }
-    case WIND: {           // p: acceleration at rest x, y, z, speed of the air
-      double a = norm3(p);
-      if (a == 0) return (Force){0, 0, 0};
-      double v[3] = {s->vx, s->vy, s->vz}, u[3] = {p[3] * p[0] / a - v[0], p[3] * p[1] / a - v[1], p[3] * p[2] / a - v[2]};
-      double k = s->mass * a / (p[3] * p[3]), moving = norm3(u), resting = s->air ? norm3(v) : 0;
-      return (Force){k * (moving * u[0] + resting * v[0]), k * (moving * u[1] + resting * v[1]),
-                     k * (moving * u[2] + resting * v[2])};
+    case WIND: {           // p: velocity of the air x, y, z, drag over mass and squared speed
+      double u[3] = {p[0] - s->vx, p[1] - s->vy, p[2] - s->vz}, moving = s->mass * p[3] * norm3(u);
+      double resting = s->mass * p[3] * s->speed;
+      return (Force){moving * u[0] + resting * s->vx, moving * u[1] + resting * s->vy, moving * u[2] + resting * s->vz};
     }
     case BUOYANCY: {       // p: share of the weight
       double k = -s->mass * p[0];
@@ -284,7 +280,6 @@ static void push(const mjModel* m, mjData* d, const Term* term) {
       s.vz = velocity[2];
       memcpy(s.spin, d->cvel + 6 * term->id, sizeof s.spin);
       memcpy(s.gravity, m->opt.gravity, sizeof s.gravity);
-      s.air = m->opt.density > 0;
     } else {
       double rate = term->object == PLANAR_YAW ? v[2] : 0;
       for (int k = 0; k < 2; k++) arm[k] = com[k] - d->xpos[3 * term->id + k];
