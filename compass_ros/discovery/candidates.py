@@ -7,20 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from compass_ros.discovery.sites_asked import Pairs, on_signals, together_and_alone
 from compass_ros.discovery.unlisted import unlisted
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached, Effect, Quantity
-from compass_ros.simulation.sites import DRIVES, JOINTS, PLANAR, Site, SiteKind, names_of
+from compass_ros.simulation.sites import DRIVES, JOINTS, PLANAR, SIGNALS, SiteKind, names_of
 from compass_ros.simulation.sizes import JointSize, alike
 from compass_ros.simulation.visited import Visited
 from compass_ros.types import Bools, Floats
 
 ALIKE: tuple[tuple[SiteKind, ...], ...] = (PLANAR, *((kind,) for kind in JOINTS))
 """What moves in the same way: one number of an effect means the same for all of them."""
-
-BY_NAME_ALONE = frozenset({"load_dependent_friction", "cogging", "joint_elasticity", "backlash", "torque_saturation"})
-"""Laws that first order, as it is here, cannot rank: a load and a motor's angle are no part of a path, a period is
-not found from four starts, and a limit does nothing before it is the largest force. They can be attached by name."""
 
 
 @dataclass(frozen=True)
@@ -53,24 +50,32 @@ class Candidate:
         return np.array([q.amplitude for q in self.quantities])
 
     @property
+    def begins(self) -> Floats:
+        """(q,) up to where each quantity does nothing."""
+        return np.array([q.begins for q in self.quantities])
+
+    @property
+    def alone(self) -> bool:
+        """Whether it is on one site; or on all of the cell that it can act on."""
+        return sum(len(part.named) for part in self.parts) == 1
+
+    @property
     def by_force(self) -> bool:
         """Whether it pushes what moves along a path, so that impulse responses tell what it does."""
-        effect = self.attached.effect
-        return effect.forces is not None and effect.moves and effect.on != ("body",)
+        return self.attached.effect.along_path and self.attached.effect.on != ("body",)
 
 
 def candidates(simulator: Simulator, values: Floats, inputs: Floats, time_s: Floats) -> tuple[Candidate, ...]:
     """All laws that can act in this cell, with the sizes that they can have there.
 
-    On all movers of a kind together and on each alone, on each wall, on the drives of a kind and on each alone. (P,)
-    values, (E, A) inputs and (E, F) times [s] say how joints move and what drives are told.
+    On all movers of a kind together and on each alone, on each wall, on the drives of a kind and on each alone, on the
+    pairs that touch and those of tracked bodies, on all signals of a kind and on each. (P,) values, (E, A) inputs and
+    (E, F) times [s] say how joints move and what drives are told.
     """
     visited = Visited(simulator, values, inputs, time_s)
-    joints = visited.joint_sizes()
+    joints, between = visited.joint_sizes(), Pairs(simulator, visited)
     out: list[Attached] = []
     for effect in EFFECTS.values():
-        if effect.name in BY_NAME_ALONE:
-            continue
         if effect.moves:
             out.extend(_on_movers(effect, simulator, joints))
             out.extend(_in_space(effect, simulator, visited))
@@ -78,6 +83,10 @@ def candidates(simulator: Simulator, values: Floats, inputs: Floats, time_s: Flo
             out.extend(Attached(effect, (wall,)) for wall in simulator.places.walls)
         elif any(kind in DRIVES for kind in effect.on):
             out.extend(_on_drives(effect, simulator, visited))
+        elif effect.paired:
+            out.extend(between.on_pairs(effect))
+        elif any(kind in SIGNALS for kind in effect.on):
+            out.extend(on_signals(effect, simulator, visited))
         elif simulator.accepts(effect, ()):
             out.append(Attached(effect, ()))
     out.extend(unlisted(simulator, values, visited))
@@ -85,11 +94,13 @@ def candidates(simulator: Simulator, values: Floats, inputs: Floats, time_s: Flo
 
 
 def _on_movers(effect: Effect, simulator: Simulator, joints: Mapping[str, JointSize]) -> Iterator[Attached]:
-    """All movers of a kind together, and each alone."""
+    """All movers of a kind together, and each alone; no joint that nothing drives, where the law acts by that force."""
     places = simulator.places
     able = [site for site in simulator.moving.values() if effect.takes(places.model, site)]
+    able = [site for site in able if not effect.loaded or joints[site.name].drive > 0]
     for kinds in ALIKE:
-        for sites in together_and_alone([site for site in able if site.kind in kinds]):
+        alike_ones = [site for site in able if site.kind in kinds]
+        for sites in [[site] for site in alike_ones] if effect.by_name else together_and_alone(alike_ones):
             names = names_of(sites)
             if sites[0].kind in JOINTS:
                 yield Attached(effect.at(alike([joints[name] for name in names])), names)
@@ -111,19 +122,15 @@ def _in_space(effect: Effect, simulator: Simulator, visited: Visited) -> Iterato
 def _on_drives(effect: Effect, simulator: Simulator, visited: Visited) -> Iterator[Attached]:
     """All drives of a kind together, and each alone; without names all of the cell where they are of one kind."""
     able = [drive for drive in simulator.places.drives if drive.kind in effect.on]
+    forces = visited.drive_forces() if effect.model is not None else None
     for kind in dict.fromkeys(drive.kind for drive in able):
         for drives in together_and_alone([drive for drive in able if drive.kind == kind]):
             objects = () if drives == able else names_of(drives)
             if effect.on_drive is None or kind == "tool_drive":
                 sized: Effect = effect
-            elif (size := visited.drive_size(drives)).command > 0:
+            elif (size := visited.drive_size(drives, forces)).command > 0:
                 sized = effect.at(size)
             else:
                 continue  # what was never told anything cannot show it
             if all(objects) or not objects:
                 yield Attached(sized, objects)
-
-
-def together_and_alone(sites: list[Site]) -> list[list[Site]]:
-    """All of some sites, and each one where they are several."""
-    return [sites, *([site] for site in sites)] if len(sites) > 1 else [[site] for site in sites]

@@ -144,7 +144,7 @@ class FirstOrder:
         width = WIDTH * scale
         sizes, gain = best_sizes(matrix[np.ix_(at, at)], pull[at], low / width, high / width, np.ones(len(at)))
         numbers = np.concatenate([r.numbers for r in parts])
-        numbers[candidate.amplitudes] = sizes * width
+        numbers[candidate.amplitudes] = sizes * width + candidate.begins[candidate.amplitudes]
         return Ranked(candidate, numbers, columns[:, :, at], gain, any(r.seen for r in parts))
 
     # --- laws of forces
@@ -202,17 +202,18 @@ class FirstOrder:
         """
         low, high, scale = _bounds(candidate)
         amplitudes, quantities = candidate.attached.amplitudes, candidate.attached.effect.quantities
+        begins = candidate.begins[amplitudes]
         found: list[Ranked] = []
         up = high >= scale
         steps, most, before = np.where(up, scale, -scale), np.where(up, high, -low), 0.0
         while np.all(np.abs(steps) <= most):
             settings = np.tile([0.0 if q.amplitude else q.start for q in quantities], (len(steps), 1))
-            settings[:, amplitudes] = np.diag(steps)
+            settings[:, amplitudes] = np.diag(begins + steps)
             change = self.response.changes(candidate.attached, settings)
             per_unit = change / steps
             sizes, gain = best_sizes(*self.of_columns(per_unit), low, high, WIDTH * scale)
             numbers = settings[0].copy()
-            numbers[amplitudes] = sizes
+            numbers[amplitudes] = begins + sizes
             found.append(self._judged(candidate, numbers, per_unit * WIDTH * scale, gain))
             done = float(np.linalg.norm(change))
             if _FELT < done < _TWICE * before:
@@ -222,9 +223,9 @@ class FirstOrder:
 
 
 def _bounds(candidate: Candidate) -> tuple[Floats, Floats, Floats]:
-    """(a,) lowest, highest and modest size of each amplitude."""
+    """(a,) lowest, highest and modest size of each amplitude, beyond where it begins to do something."""
     quantities = [q for q in candidate.quantities if q.amplitude]
-    low, high, scale = np.array([(q.low, q.high, q.scale) for q in quantities]).T
+    low, high, scale = np.array([(0.0 if q.begins else q.low, q.high - q.begins, q.scale) for q in quantities]).T
     return low, high, scale
 
 

@@ -63,14 +63,14 @@ def from_parent(parent: Hypothesis, ranked: Ranked, rows: Ints, iterations: int)
     """Fitted to some episodes from the first-order solution about its parent's fit."""
     laws = ranked.candidate.parts
     _, likelihood = widened(parent.simulator, parent.likelihood.of(rows), laws)
-    amplitude = ranked.candidate.amplitudes
+    amplitude, begins = ranked.candidate.amplitudes, ranked.candidate.begins
     found = solve_beside(parent, ranked)
     tuned, base = parent.fit.free, parent.fit.point
     starts = []
     for share in _SHARES:
         values = base.values.copy()
         values[tuned] += share * found * parent.likelihood.prior_std[tuned]
-        numbers = np.where(amplitude, share * ranked.numbers, ranked.numbers)
+        numbers = np.where(amplitude, begins + share * (ranked.numbers - begins), ranked.numbers)
         values = np.concatenate([values, numbers])
         starts.append(Point(np.clip(values, likelihood.low, likelihood.high), base.launch[rows], np.inf))
     costs, residuals = cost(likelihood, starts, parent.fit.robust)
@@ -85,7 +85,8 @@ def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:
     """(p,) first-order change of the parent's parameters beside a law at its first-order numbers."""
     tangent = parent.response.tangent
     sizes = np.array([WIDTH * q.scale for q in ranked.candidate.quantities if q.amplitude])
-    moved = ranked.columns @ (ranked.numbers[ranked.candidate.amplitudes] / sizes)
+    beyond = (ranked.numbers - ranked.candidate.begins)[ranked.candidate.amplitudes]
+    moved = ranked.columns @ (beyond / sizes)
     beside = replace(tangent, residual=tangent.residual + moved)
     change = np.zeros(len(parent.fit.free))
     change[parent.response.inside] = solve(beside, beside.normal, None).parameters

@@ -168,7 +168,7 @@ def widened(simulator: Simulator, likelihood: Likelihood, added: Sequence[Attach
     """A simulator and likelihood with more effects; priors wide beside a modest effect, bounded by what is physical."""
     wider = simulator.with_effects([*simulator.effects, *added])
     quantities = [q for a in added for q in a.effect.quantities]
-    mean = [0.0 if q.amplitude else q.start for q in quantities]
+    mean = [q.begins if q.amplitude else q.start for q in quantities]
     std = [WIDTH * q.scale if q.amplitude else (q.high - q.low) / 4 for q in quantities]
     more = sum(a.effect.scattered for a in added)
     return wider, replace(

@@ -97,21 +97,38 @@ class Response:
         """Whether a law is a force on what moves along a path, which pushes say all of."""
         flat = [site.names[0] for site in self.sites[: self.states.shape[2]]]
         effect = attached.effect
-        return effect.forces is not None and effect.moves and all(name in flat for name in attached.objects)
+        return effect.along_path and all(name in flat for name in attached.objects)
 
     @cached_property
     def states(self) -> Floats:
         """(E, K, N, 6) of each site but bodies in space: x, y, vx, vy, mass, time; of a joint angle, 0, rate, 0,
         inertia, time."""
+        return self._states_at(self.kicks.moments_s)
+
+    @cached_property
+    def _often(self) -> tuple[Floats, Floats]:
+        """(E, J, N, 6) the same as often as frames, and (K, J) how much of a force there belongs to each moment.
+
+        Of a force that changes between two moments: pushes are linear in time between them, as `readings`.
+        """
+        moments, frame = self.kicks.moments_s, float(np.nanmedian(np.diff(self.likelihood.time_s, axis=1)))
+        if len(moments) < 2:
+            return self.states, np.ones((1, 1))
+        apart = float(np.diff(moments).mean())
+        each = max(round(apart / frame), 1)
+        time = np.ravel(moments[:, None] + apart * ((np.arange(each) + 0.5) / each - 0.5))
+        return self._states_at(np.maximum(time, 0.0)), _hats(time, moments).T / each
+
+    def _states_at(self, moments_s: Floats) -> Floats:
         names = list(self.simulator.moving)
         if not names:
-            return np.zeros((*self.kicks.states.shape[:2], 0, 6))
+            return np.zeros((len(self.likelihood.inputs), len(moments_s), 0, 6))
         inputs = self.likelihood.inputs + self.fit.point.launch
         tiled = np.tile(self.fit.point.values, (len(inputs), 1))
-        paths = self.simulator.paths(tiled, inputs, self.kicks.moments_s, names)
+        paths = self.simulator.paths(tiled, inputs, moments_s, names)
         first = [int(np.flatnonzero(self.site_of == n)[0]) for n in range(len(names))]
         mass = np.broadcast_to(self.inertia[first, None], (*paths.shape[:3], 1))
-        time = np.broadcast_to(self.kicks.moments_s[:, None, None], (*paths.shape[:3], 1))
+        time = np.broadcast_to(moments_s[:, None, None], (*paths.shape[:3], 1))
         return np.concatenate([paths, mass, time], axis=3)
 
     def accelerations(self, attached: Attached, numbers: Floats) -> Floats:
@@ -154,13 +171,16 @@ class Response:
     def law(self, attached: Attached) -> Callable[[Floats], Floats]:
         """A law of forces as a function of its (q,) numbers: (E, K, n) accelerations in the directions it pushes in."""
         own = [np.flatnonzero(self.site_of == n) for n in self._chosen(attached)]
-        states = np.ascontiguousarray(self.states[:, :, self._chosen(attached)])
+        often = any(q.grid for q in attached.effect.quantities)
+        states, shares = self._often if often else (self.states, None)
+        states = np.ascontiguousarray(states[:, :, self._chosen(attached)])
         force = self.simulator.force_law(attached, self.values, states)
 
         def accelerations(numbers: Floats) -> Floats:
             of = force(np.tile(numbers, (len(states), 1)))
             parts = [of[n][..., : len(i)] / self.inertia[i] for n, i in zip(attached.objects, own, strict=True)]
-            return np.concatenate(parts, axis=2)
+            pushed = np.concatenate(parts, axis=2)
+            return pushed if shares is None else np.asarray(shares @ pushed)
 
         return accelerations
 
@@ -168,14 +188,27 @@ class Response:
         """Sites by the law's objects."""
         return [next(n for n, s in enumerate(self.sites) if s.names[0] == name) for name in attached.objects]
 
+    @cached_property
+    def _motion(self) -> Floats:
+        """(E, T + 1, n) raw rows of the fitted motion."""
+        inputs = self.likelihood.inputs + self.fit.point.launch
+        return self.simulator.raw(np.tile(self.fit.point.values, (len(inputs), 1)), inputs, self.likelihood.time_s)
+
     def changes(self, attached: Attached, numbers: Floats) -> Floats:
-        """(E, D, n) changes of the residual by (n, q) numbers of one more law, from rollouts."""
+        """(E, D, n) changes of the residual by (n, q) numbers of one more law, from rollouts.
+
+        A sensor that does not look ahead needs none: the motion is as it was.
+        """
         point, likelihood = self.fit.point, self.likelihood
         with_it = self.simulator.with_effects([*self.simulator.effects, attached])
         episodes, index = len(likelihood.inputs), np.tile(np.arange(len(likelihood.inputs)), len(numbers))
         values = np.concatenate([np.tile(point.values, (len(numbers), 1)), numbers], axis=1)
         inputs = np.tile(likelihood.inputs + point.launch, (len(numbers), 1))
-        predicted = with_it.observe(np.repeat(values, episodes, axis=0), inputs, likelihood.time_s[index])
+        asked = np.repeat(values, episodes, axis=0), inputs, likelihood.time_s[index]
+        if attached.effect.sensing is not None and attached.effect.ahead is None:
+            predicted = with_it.sensed(*asked, np.tile(self._motion, (len(numbers), 1, 1)))
+        else:
+            predicted = with_it.observe(*asked)
         there = np.nan_to_num(likelihood.difference(predicted, likelihood.measured[index]) / likelihood.sigma[index])
         change = there.reshape(len(numbers), episodes, -1) - self.tangent.residual
         return np.moveaxis(change, 0, 2)
@@ -216,10 +249,15 @@ def motion(likelihood: Likelihood) -> Floats:
 
 def readings(likelihood: Likelihood, moments: Floats) -> Floats:
     """(E, F, C, K, C) change of each observed column by an error of each at a moment, linear in time between them."""
-    time = np.clip(likelihood.time_s, moments[0], moments[-1])
-    hats = np.maximum(1 - np.abs(time[:, :, None] - moments) / np.diff(moments).mean(), 0.0)
+    hats = _hats(likelihood.time_s, moments)
     columns = likelihood.measured.shape[2]
     return np.asarray(hats[:, :, None, :, None] * np.eye(columns)[:, None, :])
+
+
+def _hats(time: Floats, moments: Floats) -> Floats:
+    """(..., K) share of each moment in a time, linear between them."""
+    time = np.clip(time, moments[0], moments[-1])
+    return np.asarray(np.maximum(1 - np.abs(time[..., None] - moments) / np.diff(moments).mean(), 0.0))
 
 
 def directions(simulator: Simulator, sites: tuple[Site, ...]) -> tuple[Ints, Ints]:

@@ -53,7 +53,7 @@ class Prior:
     def of(candidates: Sequence[Candidate]) -> Prior:
         singles, shared = Counter[str](), Counter[str]()
         for c in candidates:
-            (singles if len(c.objects) <= 1 else shared)[c.name] += 1
+            (singles if c.alone else shared)[c.name] += 1
         names = dict.fromkeys(c.name for c in candidates)
         apart = frozenset(c.name for c in candidates if c.attached.effect.apart)
         choices = {name: singles[name] if name in apart else 2 ** singles[name] - 1 for name in names}
@@ -99,15 +99,17 @@ Tell = Callable[[str, float], bool]
 def rank(first: FirstOrder, candidates: Sequence[Candidate]) -> list[Ranked]:
     """Laws at their best shape, the one that promises most first.
 
-    Joints and drives have each a size of their own too; what moves in one plane has a law in common or alone.
+    Joints, drives, pairs and signals have each a size of their own too; what moves in one plane has a law in common or
+    alone.
     """
     of_chance = [ranked_scatter(first.response, c) for c in candidates if c.attached.effect.scattered]
     found = [best for c in candidates if not c.attached.effect.scattered for best in first.ranked(c)[:1]]
     moving, alone = first.response.simulator.moving, dict[str, list[Ranked]]()
     for one in found:
         own = [moving[name].kind for name in one.candidate.objects if name in moving]
-        several_alike = not one.candidate.attached.effect.apart and not any(kind in PLANAR for kind in own)
-        if len(one.candidate.objects) == 1 and one.gain > 0 and several_alike:
+        alike = one.candidate.attached.effect.moves and any(kind in PLANAR for kind in own)
+        several = not one.candidate.attached.effect.apart and bool(one.candidate.objects) and not alike
+        if one.candidate.alone and one.gain > 0 and several:
             alone.setdefault(one.candidate.name, []).append(one)
     several = (first.together(singles) for singles in alone.values() if len(singles) > 1)
     return sorted([*found, *of_chance, *(one for one in several if one)], key=lambda f: -f.gain)
@@ -250,10 +252,10 @@ def calls_for_more(model: Hypothesis, price: float) -> bool:
 
 def promising(ranked: Sequence[Ranked], parent: Hypothesis) -> list[Ranked]:
     """Those that the parent does not have on any of their sites; of each name the best two choices of sites."""
-    has = {(a.effect.name, name) for a in parent.laws for name in a.objects or ("",)}
+    has = {(a.effect.name, site) for a in parent.laws for site in a.named}
     out: list[Ranked] = []
     for r in ranked:
-        own = {(r.candidate.name, name) for name in r.candidate.objects or ("",)}
+        own = {(r.candidate.name, site) for part in r.candidate.parts for site in part.named}
         if r.gain > 0 and not own & has and sum(o.candidate.name == r.candidate.name for o in out) < 2:
             out.append(r)
     return out
@@ -272,6 +274,6 @@ def cold_starts(ranked: Sequence[Ranked], parent: Hypothesis) -> list[tuple[tupl
 def modest(ranked: Ranked) -> Floats:
     """(q,) numbers: amplitudes at their modest sizes, shapes as first order has them or where they begin."""
     quantities = ranked.candidate.quantities
-    sizes = [q.scale if q.amplitude else (n if ranked.gain > 0 else q.start)
+    sizes = [q.begins + q.scale if q.amplitude else (n if ranked.gain > 0 else q.start)
              for q, n in zip(quantities, ranked.numbers, strict=True)]  # fmt: skip
     return np.array(sizes)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from itertools import product
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import OptimizeResult, minimize
 
 from compass_ros.simulation.effects import Quantity
 from compass_ros.types import Floats
@@ -45,7 +45,15 @@ def best_shapes(
             begun.append(int(i))
     bounds = [(quantities[i].low, quantities[i].high) for i in shape_of]
     options = {"maxfev": evaluations * len(shape_of), "xatol": 1e-4, "fatol": 1e-2}
-    found = [minimize(fall, points[i], method="Nelder-Mead", bounds=bounds, options=options) for i in begun]
+    searched = [bool(quantities[i].grid) for i in shape_of]
+
+    def down(point: Floats) -> OptimizeResult:
+        """Where all shapes are searched on grids, from a simplex within these; else from SciPy's own."""
+        near = [0.5 * float(np.diff(grid)[0]) for grid in grids] if all(searched) else []
+        corners = {"initial_simplex": np.vstack([point, point + np.diag(near)])} if near else {}
+        return minimize(fall, point, method="Nelder-Mead", bounds=bounds, options=options | corners)
+
+    found = [down(points[i]) for i in begun]
     apart = APART * np.ptp(bounds, axis=1)
     best: list[Floats] = []
     for one in sorted(found, key=lambda one: float(one.fun)):
@@ -55,8 +63,10 @@ def best_shapes(
 
 
 def shape_grid(shape: Quantity) -> Floats:
-    """Where the search for a shape begins: places evenly, sizes and rates in equal ratios, a tail at one."""
+    """Where a search begins: a shape's own grid; places evenly, sizes and rates in equal ratios, a tail at one."""
     low, high = shape.low, shape.high
+    if shape.grid:
+        return np.linspace(low, high, shape.grid)
     if shape.name == "tail":
         return np.array([shape.start])
     if low < 0 < high:

@@ -140,13 +140,14 @@ def _differences(response: Response, candidate: Candidate) -> Floats:
     """
     quantities = [q for q in candidate.attached.effect.quantities if q.amplitude]
     steps = np.array([q.scale for q in quantities])
-    change = response.changes(candidate.attached, _alone(candidate, steps))
+    begins = np.array([q.begins for q in quantities])
+    change = response.changes(candidate.attached, _alone(candidate, begins + steps))
     for _ in range(LONGER):
         unfelt = (np.linalg.norm(change, axis=(0, 1)) < FELT) & (steps * STRETCH < [q.high for q in quantities])
         if not unfelt.any():
             break
         steps = np.where(unfelt, STRETCH * steps, steps)
-        change[:, :, unfelt] = response.changes(candidate.attached, _alone(candidate, steps)[unfelt])
+        change[:, :, unfelt] = response.changes(candidate.attached, _alone(candidate, begins + steps)[unfelt])
     return np.asarray(change / steps)
 
 

@@ -327,6 +327,19 @@ class Simulator:
         rows = np.where(np.array(columns) >= 0, rows, 0.0).reshape(*rows.shape[:2], len(names), 4)
         return np.asarray(rows + np.array(rest))
 
+    def raw(self, values: Floats, inputs: Floats, time_s: Floats) -> Floats:
+        """(B, T + 1, n) raw rows of the motion up to the last time asked for, of which `sensed` makes observations."""
+        duration, columns = self.physics.duration(values, inputs, time_s), self.physics.dynamics.columns()
+        parts = [
+            self._roll(values[i : i + CHUNK], inputs[i : i + CHUNK], duration, columns)
+            for i in range(0, len(values), CHUNK)
+        ]
+        return np.concatenate(parts)
+
+    def sensed(self, values: Floats, inputs: Floats, time_s: Floats, raw: Floats) -> Floats:
+        """As `observe`, of a motion that is known."""
+        return self.physics.sensed(values, inputs, time_s, raw)
+
     def _observe_together(
         self, values: Floats, inputs: Floats, time_s: Floats, like: Ints, until: Floats
     ) -> tuple[Floats, Floats]:

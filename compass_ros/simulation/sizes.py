@@ -46,6 +46,8 @@ class JointSize:
     """Standard deviation of the position [rad]."""
     force: float
     """The largest of what inertia, gravity and actuators did, root mean square each [N m]."""
+    drive: float
+    """What drove it, root mean square [N m]."""
 
     @property
     def length_unit(self) -> str:
@@ -101,9 +103,10 @@ def joint_sizes(
         own, there, v = float(inertia[:, dof].mean()), position[:, dof], speed[:, dof]
         spread = float(np.hypot(there.std(), noise))
         typical = float(np.hypot(_rms(v), 4 * noise / seconds))
-        force = max(own * typical**2 / spread, _rms(gravity[:, dof]), _rms(drive[:, dof]))
+        driving = _rms(drive[:, dof])
+        force = max(own * typical**2 / spread, _rms(gravity[:, dof]), driving)
         fastest = max(float(np.abs(v).max()), typical)
-        out[name] = JointSize(site.kind, own, typical, fastest, float(there.mean()), spread, force)
+        out[name] = JointSize(site.kind, own, typical, fastest, float(there.mean()), spread, force, driving)
     return out
 
 
@@ -155,13 +158,14 @@ def command_unit(model: mujoco.MjModel, drive: Site) -> str:
 
 def unit_joint(kind: SiteKind) -> JointSize:
     """A joint whose every number is one: for the names and units of quantities."""
-    return JointSize(kind, *6 * [1.0])
+    return JointSize(kind, *7 * [1.0])
 
 
 def alike(sizes: Sequence[JointSize]) -> JointSize:
     """Of several joints of one kind: geometric means, and the ends of all ranges."""
     rows = np.array([(s.inertia, s.speed, s.fastest, s.force) for s in sizes])
+    drive = max(s.drive for s in sizes)
     inertia, speed, fastest, force = np.exp(np.mean(np.log(rows), axis=0)).tolist()
     middle = float(np.mean([s.middle for s in sizes]))
     spread = float(np.max([abs(s.middle - middle) + s.spread for s in sizes]))
-    return JointSize(sizes[0].kind, inertia, speed, fastest, middle, spread, force)
+    return JointSize(sizes[0].kind, inertia, speed, fastest, middle, spread, force, drive)

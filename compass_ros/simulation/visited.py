@@ -5,13 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
+import mujoco
 import numpy as np
 
 from compass_ros.simulation.balance import Balance
-from compass_ros.simulation.extents import BodySize, Path, body_size, paths, standing
+from compass_ros.simulation.extents import (
+    BodySize,
+    PairSize,
+    Path,
+    SignalSize,
+    body_size,
+    pair_size,
+    paths,
+    signal_size,
+    standing,
+)
 from compass_ros.simulation.simulator import Simulator
-from compass_ros.simulation.sites import JOINTS, Site
+from compass_ros.simulation.sites import JOINTS, Site, SiteKind
 from compass_ros.simulation.sizes import DriveSize, JointSize, command_unit, joint_sizes, largest_forces
+from compass_ros.simulation.touching import touching
 from compass_ros.types import Floats
 
 BALANCED = 4
@@ -56,6 +68,27 @@ class Visited:
         own = None if controls is None else controls[some]
         return Balance(self._simulator.written(self._values), states[some], (own, parts))
 
+    def pair_sizes(self, pairs: Sequence[Site]) -> list[PairSize]:
+        """Of pairs of geoms or bodies."""
+        model = self._simulator.physics.model
+        bodies = [tuple(_body_of(model, pair.kind, name) for name in pair.names) for pair in pairs]
+        sizes, found = self.paths_in_space(tuple(dict.fromkeys(name for two in bodies for name in two)))
+        return [
+            pair_size(pair.kind, (sizes[one], found[one]), (sizes[other], found[other]))
+            for pair, (one, other) in zip(pairs, bodies, strict=True)
+        ]
+
+    def touching(self, most: int) -> tuple[tuple[str, str], ...]:
+        """The pairs of named geoms that touch longest, of bodies that have names too."""
+        simulator = self._simulator
+        if not simulator.places.touching:
+            return ()
+        return touching(simulator.written(self._values), self._states[0], most)
+
+    def signal_size(self, site: Site) -> SignalSize:
+        """Of what is measured, as the simulator has it."""
+        return signal_size(site, self._observed)
+
     def drive_forces(self) -> Floats:
         """(nu,) the largest force of each actuator."""
         return largest_forces(self._simulator.written(self._values), *self._states)
@@ -80,9 +113,20 @@ class Visited:
         return states, (controls, simulator.physics.drives.parts)
 
     @cached_property
+    def _observed(self) -> Floats:
+        """(E, F, C)"""
+        return self._simulator.observe(*self._asked)
+
+    @cached_property
     def _commands(self) -> tuple[Floats | None, int]:
         """(E, T, n) what drives are told before any law changes it, and T."""
         plain = self._simulator.with_effects(())
         values, inputs, _ = self._asked
         _, controls, steps = plain.begun(values, inputs, plain.physics.duration(*self._asked))
         return controls, steps
+
+
+def _body_of(model: mujoco.MjModel, kind: SiteKind, name: str) -> str:
+    """The body that moves a geom or a body of that name, which may be welded to it."""
+    body = int(model.geom(name).bodyid[0]) if kind == "geom_pair" else model.body(name).id
+    return str(model.body(int(model.body_weldid[body])).name)

@@ -32,6 +32,10 @@ def asked(simulator: Simulator, inputs: Floats) -> tuple[Candidate, ...]:
     return candidates(simulator, simulator.defaults, inputs, np.tile(np.linspace(0, 0.5, 20), (len(inputs), 1)))
 
 
+def cell_signals(cell: Cell) -> list[str]:
+    return [signal.name for signal in cell.signals]
+
+
 def named(found: Sequence[Candidate], name: str) -> list[tuple[str, ...]]:
     return [c.attached.objects for c in found if c.name == name]
 
@@ -72,7 +76,10 @@ def test_laws_on_joints_are_asked_of_all_of_a_kind_and_of_each(
     for name in ON_JOINTS:
         assert named(found, name) == expected
     assert not {c.name for c in found} & (OF_TABLE | OF_CAMERA)
-    assert named(found, "latency") == named(found, "clock_drift") == [()]
+    numbers = [(name,) for name in cell_signals(cell)]
+    assert named(found, "latency") == named(found, "clock_drift") == [(), *(numbers if len(joints) > 1 else [])]
+    assert named(found, "scale") == named(found, "offset") == numbers
+    assert named(found, "eccentricity") == [(f"j{i}",) for i, kind in enumerate(joints) if kind == "hinge"]
 
 
 def test_laws_on_drives_are_asked_of_all_of_a_kind_and_of_each(
@@ -106,11 +113,11 @@ def test_every_candidate_runs_and_those_that_push_do(arm: tuple[Cell, tuple[str,
     """
     cell, _, _ = arm
     simulator, inputs = Simulator(cell, threads=1), shots(cell, 1) * np.array([[1.0], [-1.0]])
-    time = np.tile(np.linspace(0, 0.4, 15), (2, 1))
+    time = np.tile(np.linspace(0, 0.5, 15), (2, 1))
     plain = simulator.observe(np.tile(simulator.defaults, (2, 1)), inputs, time)
     for candidate in asked(simulator, inputs):
         quantities = candidate.attached.effect.quantities
-        there = np.array([2 * q.scale if q.amplitude else q.start for q in quantities])
+        there = np.array([q.begins + 2 * q.scale if q.amplitude else q.start for q in quantities])
         absent = np.array([0.0 if q.amplitude else q.start for q in quantities])
         wider = simulator.with_effects([candidate.attached])
         values = np.repeat([np.append(simulator.defaults, numbers) for numbers in (absent, there)], 2, axis=0)
@@ -122,9 +129,18 @@ def test_every_candidate_runs_and_those_that_push_do(arm: tuple[Cell, tuple[str,
             assert moved > 0, candidate
 
 
+PAIRED = {"adhesion": [("pusher", "puck1"), ("puck1", "puck2")], "rolling_resistance": []} | {
+    name: [("puck1", "puck2")] for name in ("pair_attraction", "tether")
+}
+"""Of what stays upright on a plane none rolls."""
+
+
 @pytest.mark.parametrize("name", EFFECTS)
 def test_on_the_table_every_law_is_asked_as_ever(name: str) -> None:
     found = named(asked(table_simulator(), np.array([[-0.225, 0.075, 0.0, 0.45]])), name)
+    if EFFECTS[name].paired:
+        assert found == PAIRED[name]
+        return
     pucks = [("puck1", "puck2"), ("puck1",), ("puck2",)]
     walls = [("front_wall",), ("back_wall",), ("left_wall",), ("right_wall",), ("obstacle",)]
     kind = EFFECTS[name]
@@ -204,7 +220,8 @@ def test_a_camera_sees_bodies_and_an_encoder_joints(tmp_path: Path) -> None:
         ("latency", [0]),
         ("clock_drift", [0, 1, 2, 3]),
     ):
-        (candidate,) = [c for c in asked(simulator, none) if c.name == name]
+        candidate, *alone = [c for c in asked(simulator, none) if c.name == name]
+        assert [c.attached.objects for c in alone] == ([("pole",), ("ball",)] if name == "clock_drift" else [])
         seen = simulator.with_effects([candidate.attached]).observe(np.array([[0.05]]), none, time)[0]
         changed = np.abs(seen - plain).max(axis=0) > 0
         others = np.isin(np.arange(4), own, invert=True)

@@ -30,6 +30,12 @@ class Attached:
         )
 
     @property
+    def named(self) -> tuple[tuple[str, ...], ...]:
+        """The objects by site: one each, two of a pair; one empty site where it acts on all of a kind."""
+        size = 2 if self.effect.paired else 1
+        return tuple(self.objects[i : i + size] for i in range(0, len(self.objects), size)) or ((),)
+
+    @property
     def amplitudes(self) -> Bools:
         """(q,) which quantities are amplitudes."""
         return np.array([q.amplitude for q in self.effect.quantities])

@@ -48,4 +48,5 @@ EFFECT = Effect(
     on_joint=_on_joint,
     unable=undriven,
     rotor=True,
+    by_name=True,
 )

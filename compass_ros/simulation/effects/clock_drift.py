@@ -26,4 +26,5 @@ EFFECT = Effect(
     on=SIGNALS,
     sensing=_sensing,
     ahead=_ahead,
+    of_message=True,
 )

@@ -15,6 +15,8 @@ from compass_ros.types import Floats
 
 _FINEST = 100.0
 """Periods within the travel; finer ones a joint with any inertia hardly feels, and samples hardly show."""
+_GRID = 1 + round(2 * (_FINEST - 1))
+"""Places half a period within the travel apart: a quarter off, the two ends of the travel are a quarter turn out."""
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
@@ -28,7 +30,7 @@ def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
     return (
         Quantity("cosine", size.force_unit, -most, most, scale),
         Quantity("sine", size.force_unit, -most, most, scale),
-        Quantity("periods", "1", once, _FINEST * once, once, amplitude=False, start=4 * once),
+        Quantity("periods", "1", once, _FINEST * once, once, amplitude=False, start=4 * once, grid=_GRID),
     )
 
 
@@ -40,4 +42,5 @@ EFFECT = Effect(
     on=("hinge",),
     forces=_forces,
     on_joint=_on_joint,
+    by_name=True,
 )

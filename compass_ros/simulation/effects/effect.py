@@ -36,6 +36,11 @@ class Quantity:
     """False for shapes (a centre, a radius, a frequency), which mean nothing while the amplitudes are zero."""
     start: float = 0.0
     """Where a search begins; for shapes."""
+    begins: float = 0.0
+    """Up to where an amplitude does nothing in what was seen: of a limit, where it is the largest that was reached."""
+    grid: int = 0
+    """Places, evenly from low to high, that a search for a shape has to look at, where only near ones are alike; 0: a
+    few are enough."""
 
 
 @dataclass(frozen=True)
@@ -87,12 +92,18 @@ class Effect:
     """Its quantities between two geoms or bodies; None: it acts on no pair."""
     on_signal: Callable[[SignalSize], tuple[Quantity, ...]] | None = None
     """Its quantities on one signal, from what that shows; None: `quantities`."""
+    loaded: bool = False
+    """Whether it acts by the force that drives a joint, which its path does not say."""
     rotor: bool = False
     """Whether it acts between a joint and its motor, which the scene is then compiled with (`cells/rotors.py`)."""
     apart: bool = False
     """Whether it is another law on each of its sites, so that it is never the same one on several."""
     by_name: bool = False
     """Whether it acts on what is named alone, and means nothing for all of a kind."""
+    of_message: bool = False
+    """Whether it acts on all numbers of a message alike."""
+    tuned_as: str = ""
+    """Field of a parameter of a cell that says the same of a number that is measured; empty: there is none."""
     unable: Callable[[mujoco.MjModel, Site], str] | None = None
     """Why it cannot act on a site of the right kind, where its kind does not say all; empty: it can. None: it can."""
 
@@ -100,6 +111,11 @@ class Effect:
     def moves(self) -> bool:
         """Whether it acts on bodies or joints by name."""
         return any(kind in MOVING for kind in self.on)
+
+    @property
+    def along_path(self) -> bool:
+        """Whether it is a force that follows from the path of what it acts on."""
+        return self.forces is not None and self.moves and not self.loaded
 
     @property
     def paired(self) -> bool:

@@ -64,4 +64,5 @@ EFFECT = Effect(
     on_joint=_on_joint,
     unable=undriven,
     rotor=True,
+    by_name=True,
 )

@@ -32,4 +32,6 @@ EFFECT = Effect(
     on=JOINTS,
     forces=_forces,
     on_joint=_on_joint,
+    loaded=True,
+    by_name=True,
 )

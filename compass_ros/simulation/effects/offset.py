@@ -31,4 +31,5 @@ EFFECT = Effect(
     sensing=_sensing,
     on_signal=_on_signal,
     by_name=True,
+    tuned_as="observed_offset",
 )

@@ -7,9 +7,12 @@ Source: Coulomb's law of rolling friction; `lever` is the offset of the load's l
 
 from __future__ import annotations
 
+import mujoco
+
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.extents import PairSize, unit_pair
 from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.simulation.sites import Site, slides_in_plane
 from compass_ros.simulation.sizes import MODEST
 from compass_ros.types import Floats
 
@@ -23,6 +26,23 @@ def _on_pair(size: PairSize) -> tuple[Quantity, ...]:
     return (Quantity("lever", "m", 0.0, size.extent, 0.1 * MODEST * size.extent),)
 
 
+def _unable(model: mujoco.MjModel, site: Site) -> str:
+    bodies = [int(model.body_weldid[model.geom(name).bodyid[0]]) for name in site.names]
+    return "" if any(_rolls(model, body) for body in bodies) else "neither of the two can roll"
+
+
+def _rolls(model: mujoco.MjModel, body: int) -> bool:
+    """Whether it, or what carries it, can turn, but for one that stays upright on a plane."""
+    turning = {mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL, mujoco.mjtJoint.mjJNT_HINGE}
+    while body:
+        first = int(model.body_jntadr[body])
+        kinds = set(model.jnt_type[first : first + int(model.body_jntnum[body])].tolist())
+        if kinds & turning and not slides_in_plane(model, body):
+            return True
+        body = int(model.body_parentid[body])
+    return False
+
+
 EFFECT = Effect(
     name="rolling_resistance",
     channel="contact",
@@ -31,4 +51,5 @@ EFFECT = Effect(
     on=("geom_pair",),
     forces=_forces,
     on_pair=_on_pair,
+    unable=_unable,
 )

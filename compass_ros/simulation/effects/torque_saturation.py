@@ -27,8 +27,8 @@ def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
 
 
 def _on_drive(size: DriveSize) -> tuple[Quantity, ...]:
-    """Nothing happens before the limit is the largest force that was seen: a modest one cuts a third of that off."""
-    return (Quantity("inverse_limit", "1", 0.0, 10.0 / size.force, 1.5 / size.force),)
+    """Nothing happens before the limit is the largest force that was seen: a modest one cuts a tenth of that off."""
+    return (Quantity("inverse_limit", "1", 0.0, 10.0 / size.force, 0.1 / size.force, begins=1.0 / size.force),)
 
 
 EFFECT = Effect(

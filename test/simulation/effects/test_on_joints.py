@@ -171,7 +171,7 @@ def test_a_file_of_before_springs_had_levers_still_reads(tmp_path: Path) -> None
 @pytest.mark.parametrize("kind", ["hinge", "slide"])
 @pytest.mark.parametrize("law", LAWS)
 def test_a_law_on_a_joint_comes_back_from_its_file_with_kind_and_units(tmp_path: Path, law: str, kind: str) -> None:
-    size = JointSize(kind, 0.5, 2.0, 5.0, 0.1, 1.0, 3.0)  # type: ignore[arg-type]
+    size = JointSize(kind, 0.5, 2.0, 5.0, 0.1, 1.0, 3.0, 1.0)  # type: ignore[arg-type]
     sized = effect(law).at(size)
     values = tuple(0.5 * q.high for q in sized.quantities)
     write_effects([FittedEffect(Attached(sized, ("it",)), values, values)], {}, tmp_path / "effects.yaml")

@@ -1,0 +1,89 @@
+"""On which pairs and signals of a cell laws are asked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+from compass_ros.cells import Cell
+from compass_ros.cells.signals import Signal
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import Attached, Effect
+from compass_ros.simulation.extents import PairSize
+from compass_ros.simulation.sites import Places, Site, SiteKind
+from compass_ros.simulation.visited import Visited
+
+PAIRS_ASKED = 12
+"""Pairs of a kind on which laws are asked, those that touch longest or come nearest: a budget."""
+
+
+class Pairs:
+    """Pairs of geoms that touch, and of tracked bodies, in what was visited; looked for when first asked for."""
+
+    def __init__(self, simulator: Simulator, visited: Visited) -> None:
+        self._simulator, self._visited = simulator, visited
+        self._of: dict[SiteKind, list[tuple[Site, PairSize]]] = {}
+
+    def on_pairs(self, effect: Effect) -> Iterator[Attached]:
+        """Each pair alone."""
+        for kind in effect.on:
+            if kind not in self._of:
+                self._of[kind] = list(self._found(kind))
+            for site, size in self._of[kind]:
+                if effect.takes(self._simulator.places.model, site):
+                    yield Attached(effect.at(size), site.names)
+
+    def _found(self, kind: SiteKind) -> list[tuple[Site, PairSize]]:
+        names = self._visited.touching(PAIRS_ASKED) if kind == "geom_pair" else combinations(self._bodies(), 2)
+        places = self._simulator.places
+        sites = [site for one, other in names if (site := places.pair(kind, one, other)) is not None]
+        sizes = self._visited.pair_sizes(sites)
+        found = list(zip(sites, sizes, strict=True))
+        if kind == "geom_pair":
+            return found
+        return sorted((one for one in found if one[1].nearest > 0), key=lambda one: one[1].nearest)[:PAIRS_ASKED]
+
+    def _bodies(self) -> list[str]:
+        """Those that are tracked as bodies."""
+        signals = self._simulator.cell.signals
+        return list(dict.fromkeys(n for s in signals if s.places and s.fitted and not s.jointed for n in s.at))
+
+
+def on_signals(effect: Effect, simulator: Simulator, visited: Visited) -> Iterator[Attached]:
+    """All signals of its kinds together, unless it acts on what is named, and each sensor alone.
+
+    A sensor is a number that is measured, or one message where the law acts on all of it, or cannot act on less. All
+    that a camera sees is one.
+    """
+    places = simulator.places
+    if simulator.accepts(effect, ()):
+        yield Attached(effect, ())
+    sensors = list(_sensors(effect, simulator.cell, places))
+    for sites in sensors if effect.by_name or len(sensors) > 1 else ():
+        yield Attached(effect.at(visited.signal_size(sites[0])), tuple(site.name for site in sites))
+
+
+def _sensors(effect: Effect, cell: Cell, places: Places) -> Iterator[list[Site]]:
+    """What the law acts on alone."""
+    tuned = {(p.of, p.field) for p in cell.spec.parameters}
+    cameras: list[Site] = []
+    for signal in (signal for signal in cell.signals if signal.fitted):
+        own = [s for s in places.signals if effect.takes(places.model, s) and set(s.columns) <= _columns(signal)]
+        if own and own[0].kind == "camera":
+            cameras += [site for site in own if site.name == signal.name]
+            continue
+        whole, numbers = [s for s in own if s.name == signal.name], [s for s in own if len(s.columns) == 1]
+        for site in whole if effect.of_message else numbers or whole:
+            if (signal.name, f"{effect.tuned_as}[{site.columns[0] - signal.first}]") not in tuned:
+                yield [site]
+    if cameras:
+        yield cameras
+
+
+def _columns(signal: Signal) -> set[int]:
+    return set(range(signal.first, signal.first + signal.size))
+
+
+def together_and_alone(sites: list[Site]) -> list[list[Site]]:
+    """All of some sites, and each one where they are several."""
+    return [sites, *([site] for site in sites)] if len(sites) > 1 else [[site] for site in sites]

@@ -1,0 +1,93 @@
+"""Every law is asked on every site on which it can act, and first order sees it there; some by the whole discovery."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compass_ros.cells import Cell
+from compass_ros.discovery.candidates import Candidate, candidates
+from compass_ros.discovery.first_order import FirstOrder, Ranked
+from compass_ros.discovery.search import rank
+from compass_ros.simulation import Simulator
+from compass_ros.types import Floats
+from test.discovery import asked
+from test.discovery.test_first_order import plain
+from test.simulation import robots
+
+
+def ranked(cell: Cell, inputs: Floats, law: str, on: tuple[str, ...], sizes: dict[str, float]) -> list[Ranked]:
+    """All laws about the true values of all else, where one law is planted on a site.
+
+    `sizes`: its numbers, as multiples of its modest ones beyond where it begins; shapes as they are.
+    """
+    simulator = Simulator(cell, threads=1)
+    time_s = np.tile(np.arange(0, cell.duration, 0.01), (len(inputs), 1))
+    found = candidates(simulator, simulator.defaults, inputs, time_s)
+    one = next(c for c in found if c.name == law and c.attached.objects == on)
+    likelihood = robots.recorded(simulator, [one.attached], numbers(one, sizes), inputs)
+    return rank(FirstOrder(plain(simulator, likelihood).response), found)
+
+
+def numbers(candidate: Candidate, sizes: dict[str, float]) -> list[float]:
+    return [
+        q.begins + sizes.get(q.name, 0.0) * q.scale if q.amplitude else sizes.get(q.name, q.start)
+        for q in candidate.attached.effect.quantities
+    ]
+
+
+def near_the_top(found: list[Ranked], law: str, on: tuple[str, ...]) -> Ranked:
+    names = [(r.candidate.name, r.candidate.objects) for r in found]
+    assert (law, on) in names[:3], [(*n, round(r.gain, 1)) for n, r in zip(names, found, strict=True)][:6]
+    return found[names.index((law, on))]
+
+
+@pytest.mark.parametrize(
+    ("law", "on", "sizes"),
+    [
+        ("cogging", "s", {"cosine": 2.0, "sine": -1.0, "periods": 17.3}),
+        ("cogging", "e", {"cosine": 3.0, "periods": 61.0}),
+        ("load_dependent_friction", "s", {"coefficient": 3.0}),
+        ("load_dependent_friction", "e", {"coefficient": 5.0}),
+        ("joint_elasticity", "s", {"compliance": 1.0}),
+        ("joint_elasticity", "e", {"compliance": 2.0}),
+        ("backlash", "s", {"play": 0.7}),
+        ("backlash", "e", {"play": 1.5}),
+        ("torque_saturation", "ds", {"inverse_limit": 5.0}),
+        ("torque_saturation", "de", {"inverse_limit": 2.0}),
+        ("scale", "joints.s", {"scale": 1.0}),
+        ("scale", "joints.e", {"scale": -1.0}),
+        ("offset", "joints.e", {"offset": 0.5}),
+        ("eccentricity", "joints.s", {"cosine": 1.0, "sine": 3.0}),
+        ("latency", "joints.e", {"latency": 1.0}),
+        ("clock_drift", "", {"rate": 1.0}),
+    ],
+)
+def test_a_law_on_one_joint_drive_or_encoder_is_seen_there(
+    tmp_path: Path, law: str, on: str, sizes: dict[str, float]
+) -> None:
+    cell = asked.arm(tmp_path)
+    at = (on,) if on else ()
+    found = near_the_top(ranked(cell, asked.steps(cell, 6), law, at, sizes), law, at)
+    assert found.seen
+    if law == "cogging":
+        assert found.numbers[2] == pytest.approx(sizes["periods"], rel=0.05)
+
+
+@pytest.mark.parametrize(("law", "sizes"), [("pair_attraction", {"strength": 2.0}), ("tether", {"stiffness": 3.0})])
+def test_a_law_between_two_bodies_is_seen_between_them(tmp_path: Path, law: str, sizes: dict[str, float]) -> None:
+    pair = ("red", "blue")
+    near_the_top(ranked(asked.balls(tmp_path), asked.passing(6), law, pair, sizes), law, pair)
+
+
+def test_rolling_resistance_is_seen_where_a_ball_rolls(tmp_path: Path) -> None:
+    pair = ("floor", "ball")
+    found = ranked(asked.bowl(tmp_path), asked.rolling(6), "rolling_resistance", pair, {"lever": 3.0})
+    near_the_top(found, "rolling_resistance", pair)
+
+
+def test_adhesion_is_seen_where_a_foot_sticks(tmp_path: Path) -> None:
+    pair = ("pad", "foot")
+    near_the_top(ranked(asked.foot(tmp_path), asked.lifts(6), "adhesion", pair, {"force": 10.0}), "adhesion", pair)
