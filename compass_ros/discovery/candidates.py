@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compass_ros.discovery.sites_asked import Pairs, on_signals, together_and_alone
+from compass_ros.discovery.sites_asked import Pairs, choices, on_signals
 from compass_ros.discovery.unlisted import unlisted
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached, Effect, Quantity
@@ -100,7 +100,7 @@ def _on_movers(effect: Effect, simulator: Simulator, joints: Mapping[str, JointS
     able = [site for site in able if not effect.loaded or joints[site.name].drive > 0]
     for kinds in ALIKE:
         alike_ones = [site for site in able if site.kind in kinds]
-        for sites in [[site] for site in alike_ones] if effect.by_name else together_and_alone(alike_ones):
+        for sites in choices(effect, alike_ones):
             names = names_of(sites)
             if sites[0].kind in JOINTS:
                 yield Attached(effect.at(alike([joints[name] for name in names])), names)
@@ -124,8 +124,8 @@ def _on_drives(effect: Effect, simulator: Simulator, visited: Visited) -> Iterat
     able = [drive for drive in simulator.places.drives if drive.kind in effect.on]
     forces = visited.drive_forces() if effect.model is not None else None
     for kind in dict.fromkeys(drive.kind for drive in able):
-        for drives in together_and_alone([drive for drive in able if drive.kind == kind]):
-            objects = () if drives == able else names_of(drives)
+        for drives in choices(effect, [drive for drive in able if drive.kind == kind]):
+            objects = () if drives == able and not effect.by_name else names_of(drives)
             if effect.on_drive is None or kind == "tool_drive":
                 sized: Effect = effect
             elif (size := visited.drive_size(drives, forces)).command > 0:

@@ -48,12 +48,17 @@ class Begun:
 
 
 def telling(parent: Hypothesis) -> Ints:
-    """Episodes that hold enough against a model to tell others apart by, spread over all; or all of them."""
+    """Episodes that hold enough against a model to tell others apart by; or all of them.
+
+    Spread over all from the one that holds least against it to the one that holds most: a limit, a contact or a play
+    may show in few of them.
+    """
     count = len(parent.likelihood.inputs)
     loss = robust_loss(parent.response.tangent.residual, parent.fit.robust).sum(axis=1)
     against = (parent.free.log - parent.free.alone) * loss / float(loss.sum())
+    order = np.argsort(against, kind="stable")
     for n in range(LEAST, count):
-        rows = np.unique(np.linspace(0, count - 1, n).astype(int))
+        rows = np.sort(order[np.unique(np.linspace(0, count - 1, n).astype(int))])
         if float(against[rows].sum()) >= TELLING:
             return np.asarray(rows)
     return np.arange(count)

@@ -108,8 +108,8 @@ def rank(first: FirstOrder, candidates: Sequence[Candidate]) -> list[Ranked]:
     for one in found:
         own = [moving[name].kind for name in one.candidate.objects if name in moving]
         alike = one.candidate.attached.effect.moves and any(kind in PLANAR for kind in own)
-        several = not one.candidate.attached.effect.apart and bool(one.candidate.objects) and not alike
-        if one.candidate.alone and one.gain > 0 and several:
+        own_size = not one.candidate.attached.effect.apart and bool(one.candidate.objects) and not alike
+        if one.candidate.alone and one.gain > 0 and own_size:
             alone.setdefault(one.candidate.name, []).append(one)
     several = (first.together(singles) for singles in alone.values() if len(singles) > 1)
     return sorted([*found, *of_chance, *(one for one in several if one)], key=lambda f: -f.gain)

@@ -84,6 +84,7 @@ def _columns(signal: Signal) -> set[int]:
     return set(range(signal.first, signal.first + signal.size))
 
 
-def together_and_alone(sites: list[Site]) -> list[list[Site]]:
-    """All of some sites, and each one where they are several."""
-    return [sites, *([site] for site in sites)] if len(sites) > 1 else [[site] for site in sites]
+def choices(effect: Effect, sites: list[Site]) -> list[list[Site]]:
+    """All of some sites of a kind, unless the law acts on what is named, and each one where they are several."""
+    alone = [[site] for site in sites]
+    return [sites, *alone] if len(sites) > 1 and not effect.by_name else alone

@@ -7,8 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from compass_ros.cells import Cell
-from compass_ros.types import Floats
+from compass_ros.discovery.candidates import Candidate, candidates
+from compass_ros.simulation import Simulator
+from compass_ros.types import Episode, Floats, Track
 from test.cells.written import content, parameter, written
+from test.discovery.servo import START
 
 
 def arm(folder: Path) -> Cell:
@@ -102,3 +105,39 @@ def lifts(count: int, seed: int = 4) -> Floats:
     """(count, 2) most from the pad, upwards."""
     rng = np.random.default_rng(seed)
     return np.stack([np.where(np.arange(count) % 3, -0.0005, 0.02), rng.uniform(0.03, 0.15, count)], axis=1)
+
+
+def candidate(simulator: Simulator, inputs: Floats, law: str, on: tuple[str, ...]) -> Candidate:
+    """A law as it is asked on a site. Raises StopIteration where it is not."""
+    time_s = np.tile(np.arange(0, simulator.cell.duration, 0.01), (len(inputs), 1))
+    found = candidates(simulator, simulator.defaults, inputs, time_s)
+    return next(c for c in found if c.name == law and c.attached.objects == on)
+
+
+def numbers(one: Candidate, sizes: dict[str, float]) -> list[float]:
+    """Of a law: amplitudes in modest ones beyond where it begins, shapes as given or where a search begins."""
+    return [
+        q.begins + sizes.get(q.name, 0.0) * q.scale if q.amplitude else sizes.get(q.name, q.start)
+        for q in one.attached.effect.quantities
+    ]
+
+
+def episodes(cell: Cell, inputs: Floats, one: Candidate, sizes: list[float], seed: int = 1) -> list[Episode]:
+    """Recordings at 60 Hz of a cell whose numbers are a tenth off and that has a law."""
+    rng, count = np.random.default_rng(seed), len(inputs)
+    simulator = Simulator(cell, [one.attached], threads=1)
+    values = np.append(cell.defaults * (1 + 0.1 * rng.standard_normal(len(cell.defaults))), sizes)
+    stamps = START + np.round(np.arange(0, cell.duration, 1 / 60) * 1e9).astype(np.int64)
+    seen = simulator.observe(np.tile(values, (count, 1)), inputs, np.tile((stamps - START) * 1e-9, (count, 1)))
+    seen = seen + rng.normal(0, 0.5 * cell.spec.noise_m, seen.shape)
+    return [
+        Episode(
+            name=f"episode{i:02d}",
+            cell=cell.name,
+            cell_hash=cell.hash,
+            action={a.name: float(x) for a, x in zip(cell.action, inputs[i], strict=True)},
+            start_ns=START,
+            tracks=tuple(Track(s.name, s.quantity, stamps, seen[i][:, s.columns]) for s in cell.signals),
+        )
+        for i in range(count)
+    ]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from compass_ros.cells import Cell
-from compass_ros.discovery.candidates import Candidate, candidates
+from compass_ros.config import CalibrationConfig
+from compass_ros.discovery.candidates import candidates
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.search import rank
+from compass_ros.pipeline import calibrate
 from compass_ros.simulation import Simulator
 from compass_ros.types import Floats
 from test.discovery import asked
@@ -21,21 +22,13 @@ from test.simulation import robots
 def ranked(cell: Cell, inputs: Floats, law: str, on: tuple[str, ...], sizes: dict[str, float]) -> list[Ranked]:
     """All laws about the true values of all else, where one law is planted on a site.
 
-    `sizes`: its numbers, as multiples of its modest ones beyond where it begins; shapes as they are.
+    `sizes`: its numbers, as in `asked.numbers`.
     """
     simulator = Simulator(cell, threads=1)
-    time_s = np.tile(np.arange(0, cell.duration, 0.01), (len(inputs), 1))
-    found = candidates(simulator, simulator.defaults, inputs, time_s)
-    one = next(c for c in found if c.name == law and c.attached.objects == on)
-    likelihood = robots.recorded(simulator, [one.attached], numbers(one, sizes), inputs)
+    one = asked.candidate(simulator, inputs, law, on)
+    likelihood = robots.recorded(simulator, [one.attached], asked.numbers(one, sizes), inputs)
+    found = candidates(simulator, simulator.defaults, inputs, likelihood.time_s)
     return rank(FirstOrder(plain(simulator, likelihood).response), found)
-
-
-def numbers(candidate: Candidate, sizes: dict[str, float]) -> list[float]:
-    return [
-        q.begins + sizes.get(q.name, 0.0) * q.scale if q.amplitude else sizes.get(q.name, q.start)
-        for q in candidate.attached.effect.quantities
-    ]
 
 
 def near_the_top(found: list[Ranked], law: str, on: tuple[str, ...]) -> Ranked:
@@ -91,3 +84,30 @@ def test_rolling_resistance_is_seen_where_a_ball_rolls(tmp_path: Path) -> None:
 def test_adhesion_is_seen_where_a_foot_sticks(tmp_path: Path) -> None:
     pair = ("pad", "foot")
     near_the_top(ranked(asked.foot(tmp_path), asked.lifts(6), "adhesion", pair, {"force": 10.0}), "adhesion", pair)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("law", "on", "sizes"),
+    [
+        ("cogging", "s", {"cosine": 2.0, "sine": -1.0, "periods": 17.3}),
+        ("load_dependent_friction", "s", {"coefficient": 3.0}),
+        ("joint_elasticity", "e", {"compliance": 2.0}),
+        ("backlash", "e", {"play": 1.0}),
+        ("torque_saturation", "ds", {"inverse_limit": 8.0}),
+        ("adhesion", "pad+foot", {"force": 10.0}),
+    ],
+)
+def test_such_a_law_is_named_with_its_site_and_its_numbers(
+    tmp_path: Path, law: str, on: str, sizes: dict[str, float]
+) -> None:
+    """Of the limit only the largest steps of twelve tell; all other numbers of the cell are a tenth off."""
+    cell = asked.foot(tmp_path) if law == "adhesion" else asked.arm(tmp_path)
+    inputs = asked.lifts(12) if law == "adhesion" else asked.steps(cell, 12)
+    one = asked.candidate(Simulator(cell, threads=1), inputs, law, tuple(on.split("+")))
+    planted = asked.numbers(one, sizes)
+    mismatch = calibrate(asked.episodes(cell, inputs, one, planted), cell, CalibrationConfig(threads=1))[0].mismatch
+    assert mismatch.verdict == "named", mismatch.sentence
+    (found,) = mismatch.explanations[0].laws
+    assert (found.name, found.sites) == (law, tuple(on.split("+")))
+    assert [q.value for q in found.quantities.values()] == pytest.approx(planted, rel=0.05)

@@ -39,4 +39,5 @@ EFFECT = Effect(
     on=SINGLE_DRIVES,
     model=_model,
     on_drive=_on_drive,
+    by_name=True,
 )
