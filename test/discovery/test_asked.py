@@ -94,14 +94,14 @@ def test_adhesion_is_seen_where_a_foot_sticks(tmp_path: Path) -> None:
         ("load_dependent_friction", "s", {"coefficient": 3.0}),
         ("joint_elasticity", "e", {"compliance": 2.0}),
         ("backlash", "e", {"play": 1.0}),
-        ("torque_saturation", "ds", {"inverse_limit": 8.0}),
+        ("torque_saturation", "ds", {"inverse_limit": 15.0}),
         ("adhesion", "pad+foot", {"force": 10.0}),
     ],
 )
 def test_such_a_law_is_named_with_its_site_and_its_numbers(
     tmp_path: Path, law: str, on: str, sizes: dict[str, float]
 ) -> None:
-    """Of the limit only the largest steps of twelve tell; all other numbers of the cell are a tenth off."""
+    """Of the limit only some steps of twelve tell; all other numbers of the cell are a tenth off."""
     cell = asked.foot(tmp_path) if law == "adhesion" else asked.arm(tmp_path)
     inputs = asked.lifts(12) if law == "adhesion" else asked.steps(cell, 12)
     one = asked.candidate(Simulator(cell, threads=1), inputs, law, tuple(on.split("+")))
