@@ -139,24 +139,35 @@ class Hypothesis:
     def weak(self) -> tuple[Attached, ...]:
         """Its laws that lie within ERROR_BARS of zero, all amplitudes of one together.
 
-        Error bars as the noise leaves them, and as the episodes disagree. Along directions of which the recordings say
+        Error bars as the noise leaves them, and as the episodes disagree, with the shapes as they are: at zero these
+        mean nothing, and an amplitude may be unsure because its shape is. Along directions of which the recordings say
         less than the prior nothing is judged: where only ratios show, all numbers are unsure by one common factor, and
         none of them is near zero for that. A scatter is judged by its episodes.
         """
-        free, p = self.fit.free, len(self.fit.free)
-        hessian, _ = normal_equations(self.likelihood, self.fit.point, self.fit.linear, free, self.fit.robust)
+        fit = self._with_shapes_held
+        free, p = fit.free, len(fit.free)
+        hessian, _ = normal_equations(self.likelihood, fit.point, fit.linear, free, fit.robust)
         prior = np.eye(len(hessian))
         errors = np.linalg.inv((hessian - prior) / self.likelihood.correlation_time + prior)[:p, :p]
         told, axes = np.linalg.eigh(np.linalg.inv(errors) - np.eye(p))
         axes = axes[:, told > 1.0]
-        away = ((self.fit.point.values - self.likelihood.prior_mean) / self.likelihood.prior_std)[free]
-        bars = [axes.T @ cov @ axes for cov in (errors, jackknife(self.likelihood, self.fit))]
+        away = ((fit.point.values - self.likelihood.prior_mean) / self.likelihood.prior_std)[free]
+        bars = [axes.T @ cov @ axes for cov in (errors, jackknife(self.likelihood, fit))]
         out = []
         for attached, numbers in self.own():
             own = np.isin(free, numbers.start + np.flatnonzero(attached.amplitudes))
             if not attached.effect.scattered and any(_within(away[own], axes[own] @ c @ axes[own].T) for c in bars):
                 out.append(attached)
         return tuple(out)
+
+    @property
+    def _with_shapes_held(self) -> Fit:
+        """The fit with the shapes of its laws no longer free."""
+        shapes = [n.start + np.flatnonzero(~attached.amplitudes) for attached, n in self.own()]
+        kept = np.flatnonzero(~np.isin(self.fit.free, np.concatenate([*shapes, np.empty(0, int)])))
+        linear = self.fit.linear
+        narrow = replace(linear, jacobian=linear.jacobian[..., kept], onset=linear.onset[:, kept])
+        return replace(self.fit, linear=narrow, free=self.fit.free[kept])
 
     @property
     def rho(self) -> float:
