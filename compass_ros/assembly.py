@@ -80,6 +80,7 @@ def assemble(
             found.mismatch if held_out else _unopened(found.mismatch),
             gap["calibrated"]["held_out" if held_out else "fit"].rmse_m,
             floor,
+            found.open_sigma,
         ),
         trace=estimate.trace,
         replays=drawn,

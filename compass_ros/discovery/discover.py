@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from compass_ros.calibration.likelihood import Likelihood
@@ -10,6 +12,7 @@ from compass_ros.calibration.refine import Refined
 from compass_ros.discovery.candidates import candidates
 from compass_ros.discovery.finding import Discovery, fit_failed, not_evaluated
 from compass_ros.discovery.first_order import FirstOrder, Ranked
+from compass_ros.discovery.floor import left_open
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.numerics import numerics_as_model
 from compass_ros.discovery.objections import frame_rate, objections
@@ -78,7 +81,8 @@ def weigh(
     if best > threshold and (cause := numerics_as_model(plain, best)):
         return fit_failed(f"{cause}, which is the simulator's numerics and not physics")
     tell("weigh effects", 0.95)
-    return Judge(found, held_out, noise, alpha, threshold, odds, undetectable(first), seed, warnings).discovery()
+    said = Judge(found, held_out, noise, alpha, threshold, odds, undetectable(first), seed, warnings).discovery()
+    return replace(said, open_sigma=left_open(refined, held_out, seed)) if said.mismatch.verdict == "none" else said
 
 
 def undetectable(first: list[Ranked]) -> tuple[str, ...]:

@@ -49,6 +49,8 @@ class Discovery:
     warnings: Sequence[str] = ()
     noise: Noise | None = None
     """With what the fit has shown of it, where that is more than the recordings alone did."""
+    open_sigma: float = 0.0
+    """What the parameters' error bars leave open in held-out episodes, over the noise."""
 
 
 def not_evaluated(reason: str) -> Discovery:

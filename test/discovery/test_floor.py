@@ -81,3 +81,14 @@ def test_no_published_answer_says_none_beside_such_an_error(verdict: Verdict, er
     said = honest(Mismatch(verdict, None, (), (), "", "as it was"), error, 1.0)
     assert (said.verdict == "none") == (verdict == "none" and error < TWICE)
     assert said.verdict == verdict or (verdict, said.verdict) == ("none", "unknown")
+
+
+@pytest.mark.parametrize(
+    ("error", "open_sigma", "verdict"), [(3.0, 0.0, "unknown"), (3.0, 2.0, "none"), (9.0, 2.0, "unknown")]
+)
+def test_what_the_error_bars_of_parameters_leave_open_is_no_error_of_the_model(
+    error: float, open_sigma: float, verdict: str
+) -> None:
+    said = honest(Mismatch("none", None, (), (), "", "Nothing is missing."), error, 1.0, open_sigma)
+    assert said.verdict == verdict
+    assert f"{error:.1f} times the noise" in said.sentence
