@@ -85,6 +85,8 @@ def candidates(simulator: Simulator, values: Floats, inputs: Floats, time_s: Flo
             out.extend(_on_drives(effect, simulator, visited))
         elif effect.paired:
             out.extend(between.on_pairs(effect))
+            if "contacts" in effect.on and simulator.accepts(effect, ()):
+                out.append(Attached(effect.on_kinds(("contacts",)), ()))
         elif any(kind in SIGNALS for kind in effect.on):
             out.extend(on_signals(effect, simulator, visited))
         elif simulator.accepts(effect, ()):

@@ -10,7 +10,7 @@ from compass_ros.cells.signals import Signal
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, Effect
 from compass_ros.simulation.extents import PairSize
-from compass_ros.simulation.sites import Places, Site, SiteKind
+from compass_ros.simulation.sites import PAIRS, Places, Site, SiteKind
 from compass_ros.simulation.visited import Visited
 
 PAIRS_ASKED = 12
@@ -25,11 +25,12 @@ class Pairs:
         self._of: dict[SiteKind, list[tuple[Site, PairSize]]] = {}
 
     def on_pairs(self, effect: Effect) -> Iterator[Attached]:
-        """Each pair alone."""
-        for kind in effect.on:
+        """Each pair alone; where only one touches, a law of all contacts is that one's."""
+        for kind in (kind for kind in effect.on if kind in PAIRS):
             if kind not in self._of:
                 self._of[kind] = list(self._found(kind))
-            for site, size in self._of[kind]:
+            found = self._of[kind]
+            for site, size in found if len(found) > 1 or "contacts" not in effect.on else ():
                 if effect.takes(self._simulator.places.model, site):
                     yield Attached(effect.at(size), site.names)
 

@@ -129,8 +129,12 @@ def test_every_candidate_runs_and_those_that_push_do(arm: tuple[Cell, tuple[str,
             assert moved > 0, candidate
 
 
-PAIRED = {"adhesion": [("pusher", "puck1"), ("puck1", "puck2")], "rolling_resistance": []} | {
-    name: [("puck1", "puck2")] for name in ("pair_attraction", "tether")
+TOUCH = [("pusher", "puck1"), ("puck1", "puck2")]
+PAIRED = {
+    "adhesion": TOUCH,
+    "rolling_resistance": [],
+    **dict.fromkeys(("rate_dependent_restitution", "tangential_impulse"), [*TOUCH, ()]),
+    **dict.fromkeys(("pair_attraction", "tether"), [("puck1", "puck2")]),
 }
 """Of what stays upright on a plane none rolls."""
 

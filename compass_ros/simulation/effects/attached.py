@@ -63,7 +63,7 @@ class Attached:
         kind, count = self.effect, len(self.objects)
         if (kind.moves or kind.by_name) and not count:
             return "on at least one object"
-        if kind.paired and (not count or count % 2):
+        if kind.paired and (count % 2 or (not count and "contacts" not in kind.on)):
             return f"between {in_words(kind.on)}"
         return "on one wall" if kind.on_walls and count != 1 else ""
 

@@ -207,6 +207,11 @@ def told_before(controls: Floats, context: Context) -> Floats:
     return np.zeros_like(controls[:, 0]) if context.before is None else context.before.copy()
 
 
+def on_contacts(kind: Kind, context: Context, numbers: Floats) -> tuple[Term, ...]:
+    """A term for all contacts, or for those of each pair of geoms that the law is on."""
+    return tuple(Term(kind, site if site.kind == "geom_pair" else None, numbers) for site in context.sites)
+
+
 def friction(kind: Kind, context: Context, before: Floats, after: Floats | None = None) -> tuple[Term, ...]:
     """Terms of a friction on each site: numbers before and after the creep speed and the share of the weight.
 

@@ -6,13 +6,13 @@ Source: first order of a damping that depends on speed, as in Hunt and Crossley 
 
 from __future__ import annotations
 
-from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity, on_contacts
 from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.types import Floats
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    return (Term(Kind.RATE_RESTITUTION, None, numbers),)
+    return on_contacts(Kind.RATE_RESTITUTION, context, numbers)
 
 
 EFFECT = Effect(
@@ -20,6 +20,6 @@ EFFECT = Effect(
     channel="contact",
     quantities=(Quantity("slope", "s/m", -0.8, 20.0, 0.5),),
     sentence="a restitution that depends on the speed of impact",
-    on=("contacts",),
+    on=("contacts", "geom_pair"),
     forces=_forces,
 )

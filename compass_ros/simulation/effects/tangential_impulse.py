@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.simulation.effects.effect import Context, Effect, Quantity, on_contacts
 from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.types import Floats
 
@@ -16,7 +16,7 @@ _CREEP = 0.01  # m/s
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    return (Term(Kind.TANGENTIAL, None, np.hstack([numbers, np.full_like(numbers, _CREEP)])),)
+    return on_contacts(Kind.TANGENTIAL, context, np.hstack([numbers, np.full_like(numbers, _CREEP)]))
 
 
 EFFECT = Effect(
@@ -24,6 +24,6 @@ EFFECT = Effect(
     channel="contact",
     quantities=(Quantity("friction", "1", 0.0, 0.8, 0.03),),
     sentence="friction between the rims in contacts",
-    on=("contacts",),
+    on=("contacts", "geom_pair"),
     forces=_forces,
 )

@@ -315,12 +315,21 @@ static double contact_velocity(const mjModel* m, const mjData* d, const mjContac
   return normal;
 }
 
+static int between_geoms(const mjContact* c, const Term* term) {
+  return (c->geom[0] == term->id && c->geom[1] == term->dof) || (c->geom[0] == term->dof && c->geom[1] == term->id);
+}
+
+// Whether a law of contacts acts on one that is solved: on all, or on those of its pair of geoms.
+static int acts_on(const mjContact* c, const Term* term) {
+  return c->efc_address >= 0 && (term->object != GEOM_PAIR || between_geoms(c, term));
+}
+
 // Damping that grows with the speed along the normal; MuJoCo reads efc_KBIP right after the passive forces.
 static void rate_dependent_restitution(const mjModel* m, mjData* d, const Term* term) {
   for (int i = 0; i < d->ncon; i++) {
     const mjContact* c = d->contact + i;
     double v[3];
-    if (c->efc_address < 0) continue;
+    if (!acts_on(c, term)) continue;
     d->efc_KBIP[4 * c->efc_address + 1] *= 1.0 + term->number[0] * fabs(contact_velocity(m, d, c, v));
   }
 }
@@ -329,7 +338,7 @@ static void rate_dependent_restitution(const mjModel* m, mjData* d, const Term* 
 static void tangential_impulse(const mjModel* m, mjData* d, const Term* term) {
   for (int i = 0; i < d->ncon; i++) {
     const mjContact* c = d->contact + i;
-    if (c->efc_address < 0) continue;
+    if (!acts_on(c, term)) continue;
     int a = m->geom_bodyid[c->geom[0]], b = m->geom_bodyid[c->geom[1]];
     double inverse = 0;
     if (m->body_weldid[a]) inverse += 1 / m->body_mass[a];

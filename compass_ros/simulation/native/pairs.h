@@ -26,14 +26,9 @@ static void between(const mjModel* m, mjData* d, const Term* term) {
   push_apart(m, d, force, a, b, term->id, term->dof);
 }
 
-static int of_pair(const mjContact* c, const Term* term) {
-  return c->efc_address >= 0 && ((c->geom[0] == term->id && c->geom[1] == term->dof) ||
-                                 (c->geom[0] == term->dof && c->geom[1] == term->id));
-}
-
 static int contacts_of(const mjData* d, const Term* term) {
   int count = 0;
-  for (int i = 0; i < d->ncon; i++) count += of_pair(d->contact + i, term);
+  for (int i = 0; i < d->ncon; i++) count += acts_on(d->contact + i, term);
   return count;
 }
 
@@ -42,7 +37,7 @@ static void adhesion(const mjModel* m, mjData* d, const Term* term) {
   int count = contacts_of(d, term);
   for (int i = 0; i < d->ncon; i++) {
     const mjContact* c = d->contact + i;
-    if (!of_pair(c, term)) continue;
+    if (!acts_on(c, term)) continue;
     double f = term->number[0] / count;
     mjtNum force[3] = {f * c->frame[0], f * c->frame[1], f * c->frame[2]};   // the normal points to the second geom
     push_apart(m, d, force, c->pos, c->pos, m->geom_bodyid[c->geom[0]], m->geom_bodyid[c->geom[1]]);
@@ -66,7 +61,7 @@ static void rolling_resistance(const mjModel* m, mjData* d, const Term* term) {
   int count = contacts_of(d, term);
   for (int i = 0; i < d->ncon; i++) {
     const mjContact* c = d->contact + i;
-    if (!of_pair(c, term)) continue;
+    if (!acts_on(c, term)) continue;
     int a = m->geom_bodyid[c->geom[0]], b = m->geom_bodyid[c->geom[1]];
     double one[3], two[3], v[3], spin[3], about = 0;
     inertia_of(m, a, c->frame, one);

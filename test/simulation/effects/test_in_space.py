@@ -236,3 +236,27 @@ def test_a_rolling_ball_slows_down_by_the_closed_formula(cone: str, lever: float
         mujoco.mj_step(model, data, nstep=2500)
     expected = max(0.0, 1.0 - 2.9 * slowed)
     assert data.qvel[0] == pytest.approx(expected, abs=0.02 * min(2.9 * slowed, 1) + 6e-3)
+
+
+@pytest.mark.parametrize(("name", "number"), [("rate_dependent_restitution", 1.5), ("tangential_impulse", 0.2)])
+def test_a_law_of_contacts_on_one_pair_is_the_law_of_all_there_and_nothing_elsewhere(name: str, number: float) -> None:
+    balls = "".join(
+        f'<body name="{n}" pos="{x} 0 0.2"><freejoint/><geom name="{n}" size=".05" mass=".1" priority="1" condim="1" '
+        'solref="-8000 -20"/></body>'
+        for n, x in (("left", -1), ("right", 1))
+    )
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><option timestep="5e-4"/><worldbody><geom name="floor" type="plane" size="9 9 1"/>'
+        f"{balls}</worldbody></mujoco>"
+    )
+    fast = np.tile([0.4, 0.0, -1.0, 0.0, 0.0, 0.0], 2)
+
+    def bounced(given: Exported) -> tuple[Floats, Floats]:
+        data = after(model, given, 0.3, model.qpos0, fast)
+        return data.qvel[:3].copy(), data.qvel[6:9].copy()
+
+    none, everywhere = bounced(Exported((), {})), bounced(law(name, (number,)))
+    one = bounced(law(name, (number,), "floor", "left"))
+    np.testing.assert_allclose(one[0], everywhere[0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(one[1], none[1], rtol=0, atol=1e-12)
+    assert np.linalg.norm(one[0] - none[0]) > 0.02
