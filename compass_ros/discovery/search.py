@@ -262,13 +262,22 @@ def promising(ranked: Sequence[Ranked], parent: Hypothesis) -> list[Ranked]:
 
 
 def cold_starts(ranked: Sequence[Ranked], parent: Hypothesis) -> list[tuple[tuple[Attached, ...], Floats]]:
-    """Each law that the parent lacks, on the sites that promise most, at a modest size."""
+    """Each law that the parent lacks, on the sites that promise most, at a modest size.
+
+    One that promises nothing about a fit that is bent says nothing of its sites either: it starts on all of them.
+    """
     has = {a.effect.name for a in parent.laws}
-    best: dict[str, Ranked] = {}
+    of: dict[str, list[Ranked]] = {}
     for r in ranked:
         if r.candidate.name not in has and not r.candidate.attached.effect.scattered:
-            best.setdefault(r.candidate.name, r)
-    return [(r.candidate.parts, modest(r)) for r in best.values()]
+            of.setdefault(r.candidate.name, []).append(r)
+    out = []
+    for same in of.values():
+        pairs = [r for r in same if r.candidate.alone and r.candidate.attached.effect.paired]
+        chosen = pairs if same[0].gain <= 0 and pairs else same[:1]
+        parts = tuple(part for r in chosen for part in r.candidate.parts)
+        out.append((parts, np.concatenate([modest(r) for r in chosen])))
+    return out
 
 
 def modest(ranked: Ranked) -> Floats:

@@ -133,8 +133,8 @@ TOUCH = [("pusher", "puck1"), ("puck1", "puck2")]
 PAIRED = {
     "adhesion": TOUCH,
     "rolling_resistance": [],
-    **dict.fromkeys(("rate_dependent_restitution", "tangential_impulse"), [*TOUCH, ()]),
-    **dict.fromkeys(("pair_attraction", "tether"), [("puck1", "puck2")]),
+    **{name: [*TOUCH, ()] for name in ("rate_dependent_restitution", "tangential_impulse")},
+    **{name: [("puck1", "puck2")] for name in ("pair_attraction", "tether")},
 }
 """Of what stays upright on a plane none rolls."""
 
