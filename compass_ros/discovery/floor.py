@@ -52,11 +52,13 @@ def left_open(refined: Refined, held_out: Likelihood, seed: int) -> float:
     right model fails once in DRAWS + 1 times where collisions amplify everything.
     """
     fit, rng = refined.fit, np.random.default_rng(seed)
+    seen = ~np.isnan(held_out.measured)
+    if not len(fit.free) or not seen.any():
+        return 0.0
     still = np.zeros_like(held_out.inputs)
-    moves = rng.multivariate_normal(np.zeros(len(fit.free)), refined.among, DRAWS)
+    moves = rng.multivariate_normal(np.zeros(len(fit.free)), refined.among, DRAWS, check_valid="ignore")
     points = [Point(fit.point.values, still, np.inf), *(_moved(held_out, fit, move) for move in moves)]
     _, residuals = cost(held_out, points, fit.robust)
-    seen = ~np.isnan(held_out.measured)
     return float(np.sqrt(np.mean((residuals[1:] - residuals[0])[:, seen] ** 2, axis=1)).max())
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.kicks import Kicks, inertias, kicks
-from compass_ros.simulation.transitions import Chart, changes
+from compass_ros.simulation.transitions import SMALL, Chart, changes
 from compass_ros.types import Floats
 from test.simulation import robots
 from test.simulation.table import simulator as table
@@ -141,5 +141,5 @@ def test_what_stands_still_is_moved_as_the_others_are(tmp_path: Path) -> None:
     states = np.zeros((1, 100, 1 + 4))
     states[0, :, 3] = 2.0
     sizes = changes(chart, states, np.array([0, 50, 100]), 0.001)
-    assert sizes[2] == pytest.approx(2e-3)
-    assert sizes[3] == pytest.approx(2e-4)
+    assert sizes[2] == pytest.approx(2 * SMALL)
+    assert sizes[3] == pytest.approx(0.2 * SMALL)
