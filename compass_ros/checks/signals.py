@@ -94,7 +94,7 @@ def look(tracks: Mapping[str, Track], of: Sequence[Part]) -> LookedAt:
         mended = {name: _with(track, looked, name) for name, track in mended.items()}
     found += tuple(one for looked in done for one in looked.findings)
     if not any(one.kind in KINDS for one in found):
-        found += jumping_clock(_together(done, mended, done[0].part.name.split(".")[0]))
+        found += jumping_clock(_together(done, mended))
     return LookedAt(mended, tuple(done), found)
 
 
@@ -117,7 +117,7 @@ def _checked(tracks: Mapping[str, Track], part: Part) -> Looked:
     return Looked(part, straight.series, known, (*frozen(straight.series, known), *straight.findings))
 
 
-def _together(done: Sequence[Looked], tracks: Mapping[str, Track], signal: str) -> list[Series]:
+def _together(done: Sequence[Looked], tracks: Mapping[str, Track]) -> list[Series]:
     """The numbers of all parts but turns, as they were mended, over what tells two of their values apart; where all
     are there."""
     straight = [looked for looked in done if not looked.part.turns]
@@ -126,7 +126,7 @@ def _together(done: Sequence[Looked], tracks: Mapping[str, Track], signal: str) 
     for name, track in tracks.items():
         value = np.concatenate([track.value[:, looked.part.columns] for looked in straight], axis=1) / apart
         seen = ~np.isnan(value).any(axis=1)
-        out.append(Series(name, signal, straight[0].part.limits.kind, track.stamp_ns[seen], value[seen]))
+        out.append(Series(name, track.object, straight[0].part.limits.kind, track.stamp_ns[seen], value[seen]))
     return out
 
 

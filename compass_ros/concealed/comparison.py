@@ -14,6 +14,8 @@ Json = Mapping[str, Any]
 """Content of a result.json that the schema has accepted, or of an answer whose hash holds."""
 _CENTRES = {"centre_x", "centre_y"}
 _Z90 = 1.645
+EXCESS = 1.02
+"""Held-out error over the floor from which there is something to remove."""
 
 
 @dataclass(frozen=True)
@@ -190,7 +192,7 @@ def _left(result: Json, answer: Json) -> float | None:
 def _gain(result: Json, answer: Json) -> float | None:
     """(calibrated - with effects) / (calibrated - floor); no model with effects removes nothing."""
     rms = _held_out(result, answer)
-    if not {"calibrated", "floor"} <= rms.keys() or rms["calibrated"] <= 1.02 * rms["floor"]:
+    if not {"calibrated", "floor"} <= rms.keys() or rms["calibrated"] <= EXCESS * rms["floor"]:
         return None
     return (rms["calibrated"] - rms.get("with_effects", rms["calibrated"])) / (rms["calibrated"] - rms["floor"])
 

@@ -26,7 +26,7 @@ TELLING = 300.0
 """Log evidence against the plain model in the episodes, or windows, to which the models of a race are fitted until it
 is over: a budget. Where a hundredth of it decides, more recordings only cost time."""
 LEAST = 3
-"""Of these episodes, at least."""
+"""Of these episodes, at least: as many as a verdict needs."""
 ETA = 3
 """One in so many goes on (Li et al. 2018, Hyperband: 3 or 4)."""
 FEW = 5
@@ -120,12 +120,20 @@ def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats
 
 def _at_the_end(parent: Hypothesis, laws: tuple[Attached, ...], likelihood: Likelihood, fit: Fit) -> Begun:
     """Some steps more with all parameters of the parent free, and its loss."""
-    values = fit.point.values
-    free = np.concatenate([parent.fit.free, np.arange(len(parent.fit.point.values), len(values))])
+    free, steps = _with_law(parent, fit.point.values)
     robust = max(parent.fit.robust, 3.0 * typical_residual(likelihood, fit.point))
-    steps = np.append(difference_steps(parent.fit.linear), np.full(len(free) - len(parent.fit.free), 1 / WIDTH))
     point = minimise(likelihood, fit.point, free, FEW, robust, 3.0, steps=steps, fresh=False).point
     return Begun(laws, point.values, float(cost(likelihood, [point], parent.fit.robust)[0][0]))
+
+
+def _with_law(parent: Hypothesis, values: Floats) -> tuple[Ints, Floats]:
+    """What is free in a model with one law more, of (P + q,) values, and (p + q,) steps of its differences.
+
+    All that is free in its parent, and the law, whose first steps are a modest size.
+    """
+    own = np.arange(len(parent.fit.point.values), len(values))
+    steps = np.append(difference_steps(parent.fit.linear), np.full(len(own), 1 / WIDTH))
+    return np.concatenate([parent.fit.free, own]), steps
 
 
 def _unbent(parent: Hypothesis, rows: Ints) -> tuple[Floats, Strongest, tuple[float, ...]]:
@@ -167,9 +175,7 @@ def _runner(
 def whole(parent: Hypothesis, begun: Begun) -> Hypothesis:
     """A model fitted to all episodes, with exact differences at the end."""
     simulator, likelihood = widened(parent.simulator, parent.likelihood, begun.laws)
-    own = np.arange(len(parent.fit.point.values), len(begun.values))
-    free = np.concatenate([parent.fit.free, own])
-    steps = np.append(difference_steps(parent.fit.linear), np.full(len(own), 1 / WIDTH))
+    free, steps = _with_law(parent, begun.values)
     point = Point(begun.values, parent.fit.point.launch, np.inf)
     robust = 3.0 * typical_residual(likelihood, point)
     if robust > parent.fit.robust:  # what these episodes did not hold is far off
@@ -180,7 +186,7 @@ def whole(parent: Hypothesis, begun: Begun) -> Hypothesis:
 
 def finished(hypothesis: Hypothesis) -> Hypothesis:
     """At its optimum, with exact differences there."""
-    return replace(hypothesis, fit=settled(hypothesis.likelihood, hypothesis.fit), near=None)
+    return replace(hypothesis, fit=settled(hypothesis.likelihood, hypothesis.fit))
 
 
 def without(model: Hypothesis, laws: Sequence[Attached]) -> Hypothesis:

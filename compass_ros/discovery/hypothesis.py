@@ -32,8 +32,6 @@ class Hypothesis:
     simulator: Simulator
     likelihood: Likelihood
     fit: Fit
-    near: Response | None = None
-    """The response of a fit nearby, whose pushes are taken for this one's; None: they are taken at this fit."""
     without: Floats | None = None
     """(E, F, C) what the simulator without laws leaves at its own fit [sigma]; None: this is it."""
 
@@ -48,9 +46,7 @@ class Hypothesis:
 
     @cached_property
     def response(self) -> Response:
-        if self.near is None:
-            return respond(self.simulator, self.likelihood, self.fit)
-        return replace(self.near, simulator=self.simulator, likelihood=self.likelihood, fit=self.fit)
+        return respond(self.simulator, self.likelihood, self.fit)
 
     @property
     def bare(self) -> Floats:

@@ -16,7 +16,7 @@ from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.simulation.extents import along
 from compass_ros.simulation.kicks import Kicks, inertias, kicks
-from compass_ros.simulation.simulator import CHUNK
+from compass_ros.simulation.simulator import in_chunks
 from compass_ros.simulation.sites import JOINTS, PLANAR, Site
 from compass_ros.types import Floats, Ints
 
@@ -140,16 +140,17 @@ class Response:
     def at_once(self, values: Floats, other: Floats) -> Floats:
         """(E, K, S) accelerations by which a step from the states of the moments differs with two (P,) sets of values;
         zero of signals."""
-        states, controls = self.kicks.states, self.kicks.controls
+        states, controls, simulator = self.kicks.states, self.kicks.controls, self.simulator
         flat = states.reshape(-1, states.shape[2])
-        driven = None if controls is None else controls.reshape(len(flat), 1, -1)
-        simulator, (first, second) = self.simulator, (np.tile(v, (len(flat), 1)) for v in (values, other))
-        after = [np.concatenate([simulator.play(v[i : i + CHUNK], flat[i : i + CHUNK],
-                                                None if driven is None else driven[i : i + CHUNK], 1)[0][:, 0]
-                                 for i in range(0, len(flat), CHUNK)]) for v in (first, second)]  # fmt: skip
+        driven = () if controls is None else (controls.reshape(len(flat), 1, -1),)
+
+        def stepped(of: Floats, begin: Floats, *told: Floats) -> Floats:
+            return simulator.play(of, begin, told[0] if told else None, 1)[0][:, 0]
+
+        first, second = (in_chunks(stepped, np.tile(v, (len(flat), 1)), flat, *driven) for v in (values, other))
         model = simulator.physics.model
         _, dofs = directions(simulator, self.sites)
-        change = (after[0] - after[1])[:, 1 + model.nq + dofs] / simulator.time_step
+        change = (first - second)[:, 1 + model.nq + dofs] / simulator.time_step
         out = np.zeros((*states.shape[:2], len(self.unit)))
         out[:, :, : len(dofs)] = change.reshape(*states.shape[:2], -1)
         return out

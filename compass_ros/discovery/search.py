@@ -188,12 +188,9 @@ def _widen(known: Known, best: Hypothesis, ranked: Sequence[Ranked], called: boo
 
 def beside(model: Hypothesis, ranked: Sequence[Ranked], prior: Prior) -> list[float]:
     """Log odds, to first order, of a model with one law more against the model with its discrepancy."""
-    rises = to_first_order(model.response, model.sizes, [r.columns for r in ranked])
-    scattered = [r.candidate.attached.effect.scattered for r in ranked]
-    return [
-        (r.gain if chance else rise) + prior.of_laws([r.candidate.name])
-        for r, rise, chance in zip(ranked, rises, scattered, strict=True)
-    ]
+    of_form = [r for r in ranked if not r.candidate.attached.effect.scattered]
+    rises = iter(to_first_order(model.response, model.sizes, [r.columns for r in of_form]))
+    return [(next(rises) if r in of_form else r.gain) + prior.of_laws([r.candidate.name]) for r in ranked]
 
 
 def probable(begun: Sequence[Begun], prior: Prior) -> list[Begun]:

@@ -43,6 +43,21 @@ def key(line: Line) -> Key:
     return Key(str(line["suite"]), int(line["seed"]), str(line["method"]))
 
 
+def marks_of(line: Line) -> dict[str, Any]:
+    """Of a world; none where its run failed."""
+    return dict(line.get("marks") or {})
+
+
+def mark_of(line: Line, name: str) -> Any:
+    """One of them; None where there is none."""
+    return marks_of(line).get(name)
+
+
+def kind_of(line: Line) -> str:
+    """How much is missing in the world."""
+    return str(marks_of(line).get("kind", line.get("kind", "")))
+
+
 def counted(lines: Collection[Line]) -> str:
     """How many worlds, in words."""
     return f"{len(lines)} world{'' if len(lines) == 1 else 's'}"

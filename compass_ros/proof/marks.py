@@ -6,13 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from compass_ros.concealed.comparison import EXCESS
 from compass_ros.worlds.world import UNKNOWN
 
 Json = Mapping[str, Any]
 FAINT = 2.0
 """Effect on what is tracked, over the noise, below which `none` is an answer as right as the name."""
-_EXCESS = 1.02
-"""Held-out error over the floor from which there is something to remove."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +51,10 @@ def judge(result: Json, answer: Json) -> Marks:
     left_open = _set(explanations, float(mismatch["false_alarm"])) if verdict == "ambiguous" else explanations[:1]
     names = [_names(one) for one in left_open] if named else []
     known = {name for law in laws for name in law["class"]} - {UNKNOWN}
-    if named:
-        right = all(_right(one, kind, laws) for one in names)
-    else:
-        right = _right((UNKNOWN,) if verdict == "unknown" else (), kind, laws) and verdict in ("none", "unknown")
+    bare: Mapping[str, list[tuple[str, ...]]] = {"none": [()], "unknown": [(UNKNOWN,)]}
+    said = bare.get(verdict, names)
+    right = bool(said) and all(_right(one, kind, laws) for one in said)
+    one_named = kind == "one" and right and len(names) == 1
     return Marks(
         kind=kind,
         truth=tuple(str(law["name"]) for law in laws),
@@ -65,11 +64,10 @@ def judge(result: Json, answer: Json) -> Marks:
         found=tuple(dict.fromkeys(name for one in names for name in one)),
         right=right,
         misnamed=named and any(set(one) - known - {UNKNOWN} for one in names),
-        sites_right=_sites(left_open[0]["laws"], laws[0]) if kind == "one" and names == [_names(left_open[0])] and right
-        and names[0] else None,
+        sites_right=_sites(left_open[0]["laws"], laws[0]) if one_named and names[0] else None,
         probabilities=tuple((float(e["probability"]), _right(_names(e), kind, laws)) for e in explanations),
         gain=_gain(explanations[0]) if laws and named else (0.0 if laws and not faint else None),
-    )  # fmt: skip
+    )
 
 
 def _names(explanation: Json) -> tuple[str, ...]:
@@ -111,6 +109,6 @@ def _sites(found: Sequence[Json], law: Json) -> bool:
 def _gain(explanation: Json) -> float | None:
     """(before - after) / (before - floor)."""
     of = explanation["held_out"]
-    if not of or of["before"] is None or of["before"] <= _EXCESS * of["floor"]:
+    if not of or of["before"] is None or of["before"] <= EXCESS * of["floor"]:
         return None
     return float((of["before"] - of["after"]) / (of["before"] - of["floor"]))

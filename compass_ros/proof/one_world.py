@@ -87,18 +87,14 @@ def run(suite: Suite, seed: int, method: str, threads: int) -> dict[str, object]
             return {"error": made.error}
         config, out = made.root / "config.json", made.root / "result"
         config.write_text(json.dumps({"threads": threads}), encoding="utf-8")
-        given = [
-            "--cell",
-            suite.cell,
-            "--method",
-            method,
-            "--config",
-            str(config),
-            "--progress",
-            "none",
-            "--out",
-            str(out),
-        ]
+        asked = {
+            "--cell": suite.cell,
+            "--method": method,
+            "--config": str(config),
+            "--progress": "none",
+            "--out": str(out),
+        }
+        given = [word for pair in asked.items() for word in pair]
         error, took = made.blindly("calibrate", str(made.world), *given)
         seconds = {"conceal": made.seconds, "calibrate": took}
         opened = unseal(made.world, made.answers)

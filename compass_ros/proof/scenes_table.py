@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from compass_ros.proof.lines import Line
+from compass_ros.proof.lines import Line, kind_of, mark_of, marks_of
 from compass_ros.proof.statistics import Row, at_least, medians
 
 BINS = np.linspace(0, 1, 6)
@@ -16,11 +15,11 @@ BINS = np.linspace(0, 1, 6)
 
 def rows(found: Sequence[Line]) -> list[Row]:
     """For the worlds of one scene, or of several. A world whose run failed counts as wrong."""
-    of = {kind: [x for x in found if _kind(x) == kind] for kind in ("one", "two", "none", "outside")}
-    clear = {kind: [x for x in among if not _mark(x, "faint")] for kind, among in of.items()}
-    sited = [x for x in of["one"] if _mark(x, "sites_right") is not None]
-    pairs = [tuple(pair) for x in found for pair in _marks(x).get("probabilities", ())]
-    gains = [_mark(x, "gain") for x in of["one"] + of["two"] if _mark(x, "gain") is not None]
+    of = {kind: [x for x in found if kind_of(x) == kind] for kind in ("one", "two", "none", "outside")}
+    clear = {kind: [x for x in among if not mark_of(x, "faint")] for kind, among in of.items()}
+    sited = [x for x in of["one"] if mark_of(x, "sites_right") is not None]
+    pairs = [tuple(pair) for x in found for pair in marks_of(x).get("probabilities", ())]
+    gains = [mark_of(x, "gain") for x in of["one"] + of["two"] if mark_of(x, "gain") is not None]
     seconds = [x["seconds"]["calibrate"] for x in found if x.get("seconds")]
     return [
         at_least("one law, at least twice the noise: named right or within its class", _is(clear["one"], "right"), 0.9),
@@ -64,16 +63,4 @@ def _median(values: Sequence[float]) -> str:
 
 
 def _is(among: Sequence[Line], mark: str) -> list[bool]:
-    return [bool(_mark(line, mark)) for line in among]
-
-
-def _marks(line: Line) -> dict[str, Any]:
-    return dict(line.get("marks") or {})
-
-
-def _mark(line: Line, name: str) -> Any:
-    return _marks(line).get(name)
-
-
-def _kind(line: Line) -> str:
-    return str(_marks(line).get("kind", line.get("kind", "")))
+    return [bool(mark_of(line, mark)) for line in among]

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from scipy.stats import binomtest, bootstrap
 
-from compass_ros.proof.lines import Line
+from compass_ros.proof.lines import Line, kind_of, mark_of, marks_of
 
 _LEVEL = 0.95
 _CENTRE_M = 0.02
@@ -43,12 +42,13 @@ def table(found: Sequence[Line]) -> list[Row]:
         return _small(found)
     lower = _LOWER.get(suite, 0.0)
     judged = [x for x in found if felt(x)]
-    one, two, none, outside = ([x for x in judged if _kind(x) == kind] for kind in ("one", "two", "none", "outside"))
-    alone = [x for x in one if _mark(x, "first_right") is not None and _mark(x, "right")]
-    apart = [x for x in outside if (_mark(x, "apart_m") or 0.0) >= _APART_M]
-    checks = [c for x in judged for c in _marks(x).get("parameters", ())]
-    centres = [_mark(x, "centre_error_m") for x in one if _mark(x, "right") and _mark(x, "centre_error_m") is not None]
-    gains = [_mark(x, "gain") for x in one + two if _mark(x, "gain") is not None]
+    one, two, none, outside = ([x for x in judged if kind_of(x) == kind] for kind in ("one", "two", "none", "outside"))
+    alone = [x for x in one if mark_of(x, "first_right") is not None and mark_of(x, "right")]
+    apart = [x for x in outside if (mark_of(x, "apart_m") or 0.0) >= _APART_M]
+    checks = [c for x in judged for c in marks_of(x).get("parameters", ())]
+    errors = [mark_of(x, "centre_error_m") for x in one if mark_of(x, "right")]
+    centres = [error for error in errors if error is not None]
+    gains = [mark_of(x, "gain") for x in one + two if mark_of(x, "gain") is not None]
     return [
         _share("one effect, named right or within its class", one, "right", 0.95 - lower),
         _share("of these, first name right where the class has one member", alone, "first_right", 0.95 - lower),
@@ -71,8 +71,8 @@ def table(found: Sequence[Line]) -> list[Row]:
 
 def _small(found: Sequence[Line]) -> list[Row]:
     """Effects of 0.5 mm: seldom a wrong name; where the right one is not found, silence or doubt."""
-    missed = [line for line in found if not _mark(line, "right")]
-    modest = [_mark(line, "verdict") in ("none", "ambiguous") and not _mark(line, "misnamed") for line in missed]
+    missed = [line for line in found if not mark_of(line, "right")]
+    modest = [mark_of(line, "verdict") in ("none", "ambiguous") and not mark_of(line, "misnamed") for line in missed]
     return [
         _share("one effect, named right or within its class", found, "right", 0.80),
         at_least("of the others: `none` or `ambiguous`", modest, 1.0),
@@ -84,7 +84,7 @@ def _small(found: Sequence[Line]) -> list[Row]:
 def felt(line: Line) -> bool:
     """Whether each effect moves the pucks enough: by its size in the answer, and by what the calibration leaves."""
     sizes = [effect["rms_m"] for effect in line.get("effects") or ()]
-    if sizes and (left := _mark(line, "left_m")) is not None:
+    if sizes and (left := mark_of(line, "left_m")) is not None:
         sizes.append(left)
     return line["suite"] == "small" or min(sizes, default=_FELT_M) >= _FELT_M
 
@@ -95,25 +95,13 @@ def wilson(outcomes: Sequence[bool]) -> str:
     return f"{100 * interval.low:.0f} to {100 * interval.high:.0f} %"
 
 
-def _marks(line: Line) -> dict[str, Any]:
-    return dict(line.get("marks") or {})
-
-
-def _mark(line: Line, name: str) -> Any:
-    return _marks(line).get(name)
-
-
-def _kind(line: Line) -> str:
-    return str(_marks(line).get("kind", line.get("kind", "")))
-
-
 def _share(what: str, among: Sequence[Line], mark: str, bar: float, most: bool = False) -> Row:
-    return at_least(what, [bool(_mark(line, mark)) for line in among], bar, most)
+    return at_least(what, [bool(mark_of(line, mark)) for line in among], bar, most)
 
 
 def _where(what: str, among: Sequence[Line], bar: float) -> Row:
     names = ("object_right", "phase_right", "channel_right")
-    return at_least(what, [all(_mark(line, name) for name in names) for line in among], bar)
+    return at_least(what, [all(mark_of(line, name) for name in names) for line in among], bar)
 
 
 def at_least(what: str, outcomes: Sequence[bool], bar: float, most: bool = False) -> Row:

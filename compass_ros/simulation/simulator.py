@@ -40,6 +40,12 @@ class Motion:
     """(B, T + 1, C) observed columns before any effect of the sensor."""
 
 
+def in_chunks(of: Callable[..., Floats], *rows: Floats) -> Floats:
+    """A function of rows that belong together, CHUNK of them at a time: each rollout needs a model of its own."""
+    parts = [of(*(r[i : i + CHUNK] for r in rows)) for i in range(0, len(rows[0]), CHUNK)]
+    return np.concatenate(parts)
+
+
 def with_rotors(cell: Cell, effects: Sequence[Attached]) -> Cell:
     """The cell whose scene has the rotors that effects act on, and no others."""
     return replace(cell, rotors=tuple(dict.fromkeys(n for a in effects if a.effect.rotor for n in a.objects)))
@@ -263,18 +269,11 @@ class Simulator:
 
     def motion(self, values: Floats, inputs: Floats, duration: float) -> Motion:
         """Roll out (B, P) values with (B, A) inputs for `duration` seconds."""
-        parts = [
-            self._chunk(values[i : i + CHUNK], inputs[i : i + CHUNK], duration) for i in range(0, len(values), CHUNK)
-        ]
-        return Motion(self.time_step, np.concatenate(parts))
+        return Motion(self.time_step, in_chunks(lambda v, u: self._chunk(v, u, duration), values, inputs))
 
     def observe(self, values: Floats, inputs: Floats, time_s: Floats) -> Floats:
         """(B, F, C) what the tracker says at (B, F) times [s] since the command; (B, P) values, (B, A) inputs."""
-        parts = [
-            self._observe_chunk(values[i : i + CHUNK], inputs[i : i + CHUNK], time_s[i : i + CHUNK])
-            for i in range(0, len(values), CHUNK)
-        ]
-        return np.concatenate(parts)
+        return in_chunks(self._observe_chunk, values, inputs, time_s)
 
     def observe_alike(
         self, values: Floats, inputs: Floats, time_s: Floats, like: Ints, until: Floats
@@ -330,11 +329,7 @@ class Simulator:
     def raw(self, values: Floats, inputs: Floats, time_s: Floats) -> Floats:
         """(B, T + 1, n) raw rows of the motion up to the last time asked for, of which `sensed` makes observations."""
         duration, columns = self.physics.duration(values, inputs, time_s), self.physics.dynamics.columns()
-        parts = [
-            self._roll(values[i : i + CHUNK], inputs[i : i + CHUNK], duration, columns)
-            for i in range(0, len(values), CHUNK)
-        ]
-        return np.concatenate(parts)
+        return in_chunks(lambda v, u: self._roll(v, u, duration, columns), values, inputs)
 
     def sensed(self, values: Floats, inputs: Floats, time_s: Floats, raw: Floats) -> Floats:
         """As `observe`, of a motion that is known."""

@@ -9,9 +9,9 @@ import numpy as np
 from compass_ros.cells import Cell
 from compass_ros.discovery.candidates import Candidate, candidates
 from compass_ros.simulation import Simulator
-from compass_ros.types import Episode, Floats, Track
+from compass_ros.types import Episode, Floats
 from test.cells.written import content, parameter, written
-from test.discovery.servo import START
+from test.discovery.servo import START, as_episodes
 
 
 def arm(folder: Path) -> Cell:
@@ -129,15 +129,4 @@ def episodes(cell: Cell, inputs: Floats, one: Candidate, sizes: list[float], see
     values = np.append(cell.defaults * (1 + 0.1 * rng.standard_normal(len(cell.defaults))), sizes)
     stamps = START + np.round(np.arange(0, cell.duration, 1 / 60) * 1e9).astype(np.int64)
     seen = simulator.observe(np.tile(values, (count, 1)), inputs, np.tile((stamps - START) * 1e-9, (count, 1)))
-    seen = seen + rng.normal(0, 0.5 * cell.spec.noise_m, seen.shape)
-    return [
-        Episode(
-            name=f"episode{i:02d}",
-            cell=cell.name,
-            cell_hash=cell.hash,
-            action={a.name: float(x) for a, x in zip(cell.action, inputs[i], strict=True)},
-            start_ns=START,
-            tracks=tuple(Track(s.name, s.quantity, stamps, seen[i][:, s.columns]) for s in cell.signals),
-        )
-        for i in range(count)
-    ]
+    return as_episodes(cell, inputs, stamps, seen + rng.normal(0, 0.5 * cell.spec.noise_m, seen.shape), "episode")

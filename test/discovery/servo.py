@@ -11,7 +11,7 @@ from compass_ros.cells import Cell
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, effect
 from compass_ros.simulation.sizes import unit_joint
-from compass_ros.types import Episode, Floats, Track
+from compass_ros.types import Episode, Floats, Ints, Track
 from test.cells.written import content, parameter, written
 
 START = 1_700_000_000_000_000_000
@@ -61,15 +61,19 @@ def noisy(
     stamps = START + np.round(np.arange(0, seconds, 1 / 60) * 1e9).astype(np.int64)
     time = np.tile((stamps - START) * 1e-9, (count, 1))
     seen = simulator.observe(np.tile(values, (count, 1)), inputs, time)
-    seen = seen + np.random.default_rng(seed).normal(0, noise, seen.shape)
+    return as_episodes(cell, inputs, stamps, seen + np.random.default_rng(seed).normal(0, noise, seen.shape), "step")
+
+
+def as_episodes(cell: Cell, inputs: Floats, stamps: Ints, seen: Floats, name: str) -> list[Episode]:
+    """Episodes `name`00, `name`01, ... of (E, A) actions, with (E, F, C) of all signals seen at (F,) stamps [ns]."""
     return [
         Episode(
-            name=f"step{i:02d}",
+            name=f"{name}{i:02d}",
             cell=cell.name,
             cell_hash=cell.hash,
             action={a.name: float(x) for a, x in zip(cell.action, inputs[i], strict=True)},
             start_ns=START,
-            tracks=tuple(Track(o.name, "joint", stamps, seen[i][:, [k]]) for k, o in enumerate(cell.objects)),
+            tracks=tuple(Track(s.name, s.quantity, stamps, seen[i][:, s.columns]) for s in cell.signals),
         )
-        for i in range(count)
+        for i in range(len(inputs))
     ]

@@ -17,7 +17,7 @@ from test.simulation.table import cell, simulator
 
 
 def cause(response: Response) -> str:
-    plain = Hypothesis((), response.simulator, response.likelihood, response.fit, response)
+    plain = Hypothesis((), response.simulator, response.likelihood, response.fit)
     return numerics_as_model(plain, plain.free.log - plain.free.alone)
 
 

@@ -32,7 +32,7 @@ def test_a_rollout_has_the_deviation_that_its_input_says_whatever_the_spread() -
 
 def plain(deviation: Floats) -> Hypothesis:
     response = response_of(recorded_with([JITTER], deviation[:, None], SHOTS))
-    return Hypothesis((), response.simulator, response.likelihood, response.fit, response)
+    return Hypothesis((), response.simulator, response.likelihood, response.fit)
 
 
 def test_deviations_and_their_spread_are_found() -> None:

@@ -36,6 +36,8 @@ class Quantity:
     """False for shapes (a centre, a radius, a frequency), which mean nothing while the amplitudes are zero."""
     start: float = 0.0
     """Where a search begins; for shapes."""
+    later: bool = False
+    """Whether files were written before the law had it; it is zero in them."""
     begins: float = 0.0
     """Up to where an amplitude does nothing in what was seen: of a limit, where it is the largest that was reached."""
     grid: int = 0

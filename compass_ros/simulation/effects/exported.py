@@ -139,8 +139,8 @@ def _variants(entry: _Entry, path: Path | str) -> list[Effect]:
 
 
 def _later(kind: Effect, found: Mapping[str, str]) -> dict[str, str]:
-    """Shapes that a law has got since a file was written, and that are zero in it."""
-    return {q.name: q.unit for q in kind.quantities if not q.amplitude and q.low <= 0 and q.name not in found}
+    """Numbers that a law has got since a file was written, and that are zero in it."""
+    return {q.name: q.unit for q in kind.quantities if q.later and q.name not in found}
 
 
 def _units(kind: Effect) -> dict[str, str]:

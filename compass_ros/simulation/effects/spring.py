@@ -22,7 +22,7 @@ def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
 def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
     """With a rest beyond the ends of what was seen it would rather be a constant push."""
     most, reach = size.force / size.spread, 3.0 * size.spread
-    lever = Quantity("lever", "1", 0.0, 1.0, 0.5, amplitude=False, start=0.5)
+    lever = Quantity("lever", "1", 0.0, 1.0, 0.5, amplitude=False, start=0.5, later=True)
     return (
         Quantity("stiffness", size.unit("/L"), 0.0, LARGEST * most, MODEST * most),
         Quantity(

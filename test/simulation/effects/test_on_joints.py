@@ -12,6 +12,7 @@ from compass_ros.discovery.candidates import candidates
 from compass_ros.discovery.first_order import FirstOrder
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, Exported, FittedEffect, attach, effect, read_effects, write_effects
+from compass_ros.simulation.sites import SiteKind
 from compass_ros.simulation.sizes import JointSize, unit_joint
 from compass_ros.simulation.visited import Visited
 from compass_ros.types import Floats
@@ -170,8 +171,10 @@ def test_a_file_of_before_springs_had_levers_still_reads(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("kind", ["hinge", "slide"])
 @pytest.mark.parametrize("law", LAWS)
-def test_a_law_on_a_joint_comes_back_from_its_file_with_kind_and_units(tmp_path: Path, law: str, kind: str) -> None:
-    size = JointSize(kind, 0.5, 2.0, 5.0, 0.1, 1.0, 3.0, 1.0)  # type: ignore[arg-type]
+def test_a_law_on_a_joint_comes_back_from_its_file_with_kind_and_units(
+    tmp_path: Path, law: str, kind: SiteKind
+) -> None:
+    size = JointSize(kind, 0.5, 2.0, 5.0, 0.1, 1.0, 3.0, 1.0)
     sized = effect(law).at(size)
     values = tuple(0.5 * q.high for q in sized.quantities)
     write_effects([FittedEffect(Attached(sized, ("it",)), values, values)], {}, tmp_path / "effects.yaml")
