@@ -17,21 +17,15 @@ from compass_ros.calibration.least_squares import (
     Fit,
     Linear,
     Point,
-    broyden,
-    central,
-    cost,
-    damped_step,
     difference_steps,
     linearise,
     minimise,
-    move_between,
-    normal_equations,
     start,
 )
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.residuals import chi_square, covariance, information_share, typical_residual
 from compass_ros.calibration.screen import WORTH, acting, coupling, independent, many
-from compass_ros.calibration.valleys import along_valleys
+from compass_ros.calibration.settle import settled
 from compass_ros.types import Floats, Ints
 
 OF_WINDOWS = 2
@@ -52,21 +46,6 @@ ROBUST = 4.0
 
 CALM = 300.0
 """Movement of a frame by one prior width [sigma] above which it is trusted less; ordinary shots stay below."""
-
-SETTLING = 6
-"""How often differences are taken at the end, at most."""
-SERVE = 8
-"""Steps that they serve, at most."""
-FINE = (0.1, 0.03)
-"""Lengths of these differences, in turn, as shares of those that move the residual by one sigma. The short ones are
-exact; the long ones see past what the simulator's steps at contacts do to a short one."""
-SETTLED = 0.3
-"""Fall of the cost [log likelihood] by a step, or by all steps with the same differences, that is the last one."""
-WORTHWHILE = 0.05
-"""Share of what is left above the noise that all steps with the same differences must gain: where something else
-differs, exact values are of no use."""
-_DAMPING = (1e-9, 1e-3, 1e-2, 1e-1, 1.0, 1e1)
-"""Damping factors that are tried at once at the end."""
 
 SMALL = 0.3
 """Size of the changes that show the simulator's roughness, in steps of the differences: curvature must not count."""
@@ -236,52 +215,16 @@ def some(likelihood: Likelihood) -> Likelihood:
     return likelihood.of(np.arange(0, episodes, every)) if episodes >= 2 * every else likelihood
 
 
-def settled(likelihood: Likelihood, fit: Fit, rounds: int = 2) -> Fit:
-    """The last steps to the optimum: Gauss-Newton with short central differences, which serve several steps.
-
-    Along a valley that coupled parameters share, their effects cancel to a hundredth. Differences that are wrong by
-    some per cent, as those of `minimise` are, end there, tens of log likelihood above the optimum. What a step has
-    shown is added to them (Broyden): the shapes of a field bend the valley. `rounds`: of differences, at least.
-    """
-    free, robust, linear = fit.free, fit.robust, fit.linear
-    point = replace(fit.point, cost=float(cost(likelihood, [fit.point], robust)[0][0]))
-    for taken in range(SETTLING):
-        steps = FINE[taken % len(FINE)] * difference_steps(linear)
-        linear = central(likelihood, point, free, steps, linear.onset if taken else None)
-        linear = along_valleys(likelihood, point, linear, free, robust)
-        before = point.cost
-        for _ in range(SERVE):
-            best, residual = _best_step(likelihood, point, linear, free, robust)
-            step = point.cost - best.cost
-            if step <= 0:
-                break
-            linear = broyden(linear, residual, move_between(likelihood, point, best, free))
-            point = best
-            if step < SETTLED:
-                break
-        unexplained = point.cost - 0.5 * likelihood.measurements
-        if taken >= rounds - 1 and before - point.cost < max(SETTLED, WORTHWHILE * unexplained):
-            break
-    return replace(fit, point=point, linear=linear)
-
-
-def _best_step(likelihood: Likelihood, point: Point, linear: Linear, free: Ints, robust: float) -> tuple[Point, Floats]:
-    """The best of some damped steps, with its residual."""
-    hessian, gradient = normal_equations(likelihood, point, linear, free, robust)
-    trials = [damped_step(likelihood, point, free, hessian, gradient, damping) for damping in _DAMPING]
-    costs, residuals = cost(likelihood, trials, robust)
-    best = int(np.argmin(costs))
-    return replace(trials[best], cost=float(costs[best])), residuals[best]
-
-
 def calmed(likelihood: Likelihood, linear: Linear) -> Likelihood:
     """Trust frames less that the parameters move by more than CALM sigma per prior width.
 
     After an unlucky collision everything is amplified: the fit's errors, numerics, and physics that nobody asked about.
-    Such frames say little about the parameters that other frames do not say better.
+    Such frames say little about the parameters that other frames do not say better. Where half of the episodes are
+    moved as much, it is what the parameters do, and no accident: a spring that swings for a while.
     """
     movement = np.sqrt(np.sum(linear.jacobian**2, axis=-1)).max(axis=-1)  # (E, F)
-    amplified = np.maximum.accumulate(movement, axis=1) / CALM
+    largest = np.maximum.accumulate(movement, axis=1)
+    amplified = largest / np.maximum(CALM, np.median(largest, axis=0))
     return replace(likelihood, sigma=likelihood.sigma * np.maximum(1.0, amplified)[:, :, None])
 
 

@@ -14,9 +14,11 @@ from compass_ros.discovery.finding import Discovery, fit_failed, not_evaluated
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.floor import left_open
 from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.neighbours import rank
 from compass_ros.discovery.numerics import numerics_as_model
 from compass_ros.discovery.objections import frame_rate, objections
-from compass_ros.discovery.search import Prior, Tell, rank, search
+from compass_ros.discovery.odds import Prior
+from compass_ros.discovery.search import Tell, search
 from compass_ros.discovery.threshold import largest_odds
 from compass_ros.discovery.verdict import Judge
 from compass_ros.errors import DataError

@@ -9,8 +9,9 @@ import numpy as np
 
 from compass_ros.calibration.least_squares import Fit, Point, cost, difference_steps, extended, minimise, robust_loss
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import Strongest, growing, settled, strongest
+from compass_ros.calibration.refine import Strongest, growing, strongest
 from compass_ros.calibration.residuals import typical_residual
+from compass_ros.calibration.settle import settled
 from compass_ros.discovery.discrepancy import free
 from compass_ros.discovery.evidence import solve
 from compass_ros.discovery.first_order import WIDTH, Ranked

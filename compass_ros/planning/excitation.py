@@ -17,7 +17,7 @@ from compass_ros.calibration.identifiability import information, told
 from compass_ros.calibration.least_squares import Linear, difference_steps, linearise, start
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import measure_noise
-from compass_ros.calibration.refine import FINE
+from compass_ros.calibration.settle import FINE
 from compass_ros.errors import DataError
 from compass_ros.planning.motions import Limits, Motions, motions, size
 from compass_ros.posing import pose

@@ -18,7 +18,7 @@ from compass_ros.calibration.least_squares import (
     start,
 )
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import settled
+from compass_ros.calibration.settle import settled
 from compass_ros.types import Floats
 from test.calibration.toys import likelihood, linear, oscillation
 

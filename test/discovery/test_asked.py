@@ -10,7 +10,7 @@ from compass_ros.cells import Cell
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery.candidates import candidates
 from compass_ros.discovery.first_order import FirstOrder, Ranked
-from compass_ros.discovery.search import rank
+from compass_ros.discovery.neighbours import rank
 from compass_ros.pipeline import calibrate
 from compass_ros.simulation import Simulator
 from compass_ros.types import Floats

@@ -16,8 +16,9 @@ from compass_ros.cells.auto import with_auto
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery.candidates import Candidate, candidates
 from compass_ros.discovery.first_order import FirstOrder, Ranked
+from compass_ros.discovery.neighbours import rank
+from compass_ros.discovery.odds import Prior
 from compass_ros.discovery.response import respond
-from compass_ros.discovery.search import Prior, rank
 from compass_ros.discovery.words import missing
 from compass_ros.pipeline import calibrate
 from compass_ros.simulation import Simulator

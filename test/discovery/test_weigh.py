@@ -13,7 +13,9 @@ from compass_ros.config import CalibrationConfig
 from compass_ros.discovery.candidates import candidates
 from compass_ros.discovery.first_order import FirstOrder
 from compass_ros.discovery.hypothesis import Hypothesis
-from compass_ros.discovery.search import Prior, rank, search
+from compass_ros.discovery.neighbours import rank
+from compass_ros.discovery.odds import Prior
+from compass_ros.discovery.search import search
 from compass_ros.discovery.threshold import BEYOND, largest_odds, simulated
 from compass_ros.pipeline import calibrate
 from compass_ros.simulation import Simulator

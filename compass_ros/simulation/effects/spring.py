@@ -1,9 +1,10 @@
 """A spring that the model lacks, or a cable that bends.
 
-F = -stiffness (q - rest), a force on a slide; on a hinge a torque F = -stiffness sin(lever (q - rest)) / lever, which
-is the same at lever 0. At 1 it is k a b sin(q - rest) of a helical spring between two points beside the axis, a and b
-away from it, as they balance arms.
-Source: Hooke's law; Herder 2001, Energy-free systems, ch. 3 (a spring of zero free length).
+F = -stiffness (q - rest), a force on a slide; on a hinge a torque F = -stiffness sin(softening (q - rest)) / softening,
+which is the same at 0. At 1 it is k a b sin(q - rest) of a helical spring between two points beside the axis, a and b
+away from it, as they balance arms. Below 0 it stiffens: F = -stiffness sinh(s (q - rest)) / s with s = -softening.
+Source: Hooke's law; Herder 2001, Energy-free systems, ch. 3 (a spring of zero free length); Fung 1967, Am. J. Physiol.
+213, 1532 (stress of a fibre that stiffens, an exponential of its strain).
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
 def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
     """With a rest beyond the ends of what was seen it would rather be a constant push."""
     most, reach = size.force / size.spread, 3.0 * size.spread
-    lever = Quantity("lever", "1", 0.0, 1.0, 0.5, amplitude=False, start=0.5, later=True)
+    softening = Quantity("softening", "1", -2.0 / size.spread, 1.0, 0.5, amplitude=False, later=True)
     return (
         Quantity("stiffness", size.unit("/L"), 0.0, LARGEST * most, MODEST * most),
         Quantity(
@@ -34,7 +35,7 @@ def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
             amplitude=False,
             start=size.middle,
         ),
-        *([lever] if size.kind == "hinge" else []),
+        *([softening] if size.kind == "hinge" else []),
     )
 
 

@@ -23,7 +23,7 @@ def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
     v = size.fastest
     return (
         Quantity("extra", size.force_unit, 0.0, LARGEST * size.force, MODEST * size.force),
-        Quantity("speed", f"{size.length_unit}/s", 0.01 * v, 3.0 * v, 0.1 * v, amplitude=False, start=0.2 * v),
+        Quantity("speed", f"{size.length_unit}/s", 0.01 * v, v, 0.1 * v, amplitude=False, start=0.2 * v),
     )
 
 

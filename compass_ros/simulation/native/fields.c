@@ -45,6 +45,8 @@ typedef struct {
 
 typedef void (*ApplyFT)(const mjModel*, mjData*, const mjtNum*, const mjtNum*, const mjtNum*, int, mjtNum*);
 typedef void (*FwdActuation)(const mjModel*, mjData*);
+typedef void (*Rne)(const mjModel*, mjData*, int, mjtNum*);
+typedef void (*SolveM)(const mjModel*, mjData*, mjtNum*, const mjtNum*, int);
 
 // Open addressing. DELETED keeps chains whole; where a chain ends in them, they turn back into empty slots. So a look-up
 // that runs meanwhile for another model always finds it. Writers hold Python's lock.
@@ -52,6 +54,8 @@ static Entry entries[TABLE];
 static int live;
 static ApplyFT apply_ft;
 static FwdActuation fwd_actuation;
+static Rne rne;
+static SolveM solve_m;
 #define DELETED ((const mjModel*)entries)
 
 static size_t home_of(const mjModel* model) { return ((uintptr_t)model >> 6) * 2654435761u % TABLE; }
@@ -63,9 +67,11 @@ static const Program* find(const mjModel* model) {
 }
 
 // How many kinds of force there are: a library that was compiled from another source has other ones. 0 without them.
-int compass_init(ApplyFT apply, FwdActuation actuation) {
+int compass_init(ApplyFT apply, FwdActuation actuation, Rne bias, SolveM solve) {
   apply_ft = apply;
   fwd_actuation = actuation;
+  rne = bias;
+  solve_m = solve;
   return TETHER;
 }
 
@@ -94,11 +100,11 @@ void compass_forget(const mjModel* model) {
 // --- forces on one object -----------------------------------------------------------------------------------------------
 
 // What a force may depend on: position [m] and velocity [m/s] in the world (JOINT: angle and rate in [0]), inertia.
-// Numbers of a joint are forces and torques themselves: its mass is 1 and it has no weight. `give` is the speed that a
-// unit force takes from it within a step [m/s per N]; 0 for bodies. `load`: what drives a joint. Of a body in space also
-// its spin and gravity, in the world.
+// Numbers of a joint are forces and torques themselves: its mass is 1 and it has no weight. `load`: what drives a joint.
+// `stop`: the force against which it would be at rest after the step; 0 where it is not known. Of a body in space also its
+// spin and gravity, in the world.
 typedef struct {
-  double x, y, vx, vy, vz, speed, mass, weight, time, give, load;
+  double x, y, vx, vy, vz, speed, mass, weight, time, stop, load;
   double spin[3], gravity[3];
 } State;
 
@@ -106,10 +112,11 @@ typedef struct {
   double x, y, z;
 } Force;
 
-// Against the velocity, smooth through zero: over the creep speed, and over what the force itself stops within a step.
+// Against the velocity, smooth through zero over the creep speed. A joint it stops within a step, and then holds against
+// all that loads it, up to its magnitude.
 static Force along(const State* s, double magnitude, double creep) {
-  double stopped = magnitude * s->give, rate = sqrt(s->speed * s->speed + creep * creep + stopped * stopped);
-  double k = rate > 0 ? -magnitude / rate : 0;
+  if (s->stop && magnitude > 0) return (Force){-fmax(-magnitude, fmin(magnitude, s->stop)), 0, 0};
+  double rate = sqrt(s->speed * s->speed + creep * creep), k = rate > 0 ? -magnitude / rate : 0;
   return (Force){k * s->vx, k * s->vy, k * s->vz};
 }
 
@@ -199,12 +206,12 @@ static Force evaluate(const Term* term, const State* s) {
       if (p[6] == 2) return along(s, value, term->object == JOINT ? 0 : 1e-3);
       return p[6] == 0 ? (Force){value, 0, 0} : (Force){0, value, 0};
     }
-    case SPRING: {         // p: stiffness, rest, lever
-      double away = s->x - p[1];
-      return (Force){-s->mass * p[0] * (p[2] ? sin(p[2] * away) / p[2] : away), 0, 0};
+    case SPRING: {         // p: stiffness, rest, softening
+      double away = s->x - p[1], turn = p[2] * away;
+      return (Force){-s->mass * p[0] * (p[2] > 0 ? sin(turn) / p[2] : p[2] < 0 ? sinh(turn) / p[2] : away), 0, 0};
     }
     case ASYMMETRIC:       // p: extra friction forwards
-      return s->vx > 0 ? along(s, p[0], 0) : (Force){0, 0, 0};
+      return (s->stop ? s->stop : s->vx) > 0 ? along(s, p[0], 0) : (Force){0, 0, 0};
     case LOAD_FRICTION:    // p: friction as a share of the load
       return along(s, p[0] * fabs(s->load), 0);
     case COGGING:          // p: cosine and sine amplitude, periods per turn
@@ -256,7 +263,17 @@ static void body_velocity(const mjModel* m, const mjData* d, int body, const dou
   out[2] = w[5] + w[0] * r[1] - w[1] * r[0];
 }
 
-static void push(const mjModel* m, mjData* d, const Term* term) {
+// Whether it is a friction that holds a joint.
+static int dry(const Term* term) {
+  if (term->object != JOINT) return 0;
+  switch (term->kind) {
+    case COULOMB: case STRIBECK: case ASYMMETRIC: case LOAD_FRICTION: return 1;
+    case LIBRARY: return term->number[6] == 2;
+    default: return 0;
+  }
+}
+
+static void push(const mjModel* m, mjData* d, const Term* term, double stop) {
   State s = {.time = d->time};
   const double* v = d->qvel + term->dof;
   const double* com = d->xipos + (term->object == JOINT ? 0 : 3 * term->id);
@@ -265,7 +282,7 @@ static void push(const mjModel* m, mjData* d, const Term* term) {
     s.x = d->qpos[m->jnt_qposadr[term->id]];
     s.vx = v[0];
     s.mass = 1;
-    s.give = m->opt.timestep / d->qM[m->dof_Madr[term->dof]];
+    s.stop = stop;
     if (term->kind == LOAD_FRICTION) s.load = d->qfrc_actuator[term->dof] + d->qfrc_applied[term->dof];
   } else {
     s.x = com[0];
@@ -362,13 +379,34 @@ static void tangential_impulse(const mjModel* m, mjData* d, const Term* term) {
 
 // --- what MuJoCo calls --------------------------------------------------------------------------------------------------
 
+// Frictions that hold joints, one after the other, each against what the others leave: a sweep of Gauss and Seidel. They
+// come after all other forces, for a joint is held against these.
+static void hold(const mjModel* m, mjData* d, const Program* program) {
+  double load[m->nv], acceleration[m->nv], unit[m->nv], column[m->nv];
+  fwd_actuation(m, d);   // MuJoCo computes these two after the passive forces
+  rne(m, d, 0, d->qfrc_bias);
+  for (int k = 0; k < m->nv; k++)
+    load[k] = d->qfrc_passive[k] + d->qfrc_actuator[k] + d->qfrc_applied[k] - d->qfrc_bias[k], unit[k] = 0;
+  solve_m(m, d, acceleration, load, 1);
+  for (int64_t i = 0; i < program->n; i++) {
+    const Term* term = program->term + i;
+    if (!dry(term)) continue;
+    int dof = term->dof;
+    unit[dof] = 1;
+    solve_m(m, d, column, unit, 1);
+    unit[dof] = 0;
+    double before = d->qfrc_passive[dof];
+    push(m, d, term, (d->qvel[dof] / m->opt.timestep + acceleration[dof]) / column[dof]);
+    for (int k = 0; k < m->nv; k++) acceleration[k] += column[k] * (d->qfrc_passive[dof] - before);
+  }
+}
+
 void compass_passive(const mjModel* m, mjData* d) {
   const Program* program = find(m);
   if (!program) return;
-  int driven = 0;   // whether forces of actuators are those of this state: MuJoCo computes them after the passive ones
+  int holding = 0;
   for (int64_t i = 0; i < program->n; i++) {
     const Term* term = program->term + i;
-    if (term->kind == LOAD_FRICTION && !driven) fwd_actuation(m, d), driven = 1;
     switch (term->kind) {
       case RATE_RESTITUTION: rate_dependent_restitution(m, d, term); break;
       case TANGENTIAL: tangential_impulse(m, d, term); break;
@@ -376,7 +414,8 @@ void compass_passive(const mjModel* m, mjData* d) {
       case ROLLING: rolling_resistance(m, d, term); break;
       case PAIR_ATTRACTION: case TETHER: between(m, d, term); break;
       case SERVO_DEAD_BAND: servo_dead_band(m, d, term); break;
-      default: push(m, d, term);
+      default: if (dry(term)) holding = 1; else push(m, d, term, 0);
     }
   }
+  if (holding) hold(m, d, program);
 }

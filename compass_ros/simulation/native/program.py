@@ -196,10 +196,11 @@ def _library() -> ctypes.PyDLL:
     library.compass_forget.restype = None
     library.compass_evaluate.argtypes = [ctypes.c_int64, *2 * [ctypes.c_void_p], ctypes.c_double, ctypes.c_void_p]
     library.compass_evaluate.restype = None
-    library.compass_init.argtypes = 2 * [ctypes.c_void_p]
+    library.compass_init.argtypes = 4 * [ctypes.c_void_p]
     library.compass_init.restype = ctypes.c_int
     mj = mujoco_library()
-    called = [ctypes.cast(function, ctypes.c_void_p) for function in (mj.mj_applyFT, mj.mj_fwdActuation)]
+    functions = mj.mj_applyFT, mj.mj_fwdActuation, mj.mj_rne, mj.mj_solveM
+    called = [ctypes.cast(function, ctypes.c_void_p) for function in functions]
     if library.compass_init(*called) != max(Kind):
         raise ConfigError(f"{path}: was compiled from another version of fields.c; run `make install`")
     callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)

@@ -1,0 +1,99 @@
+"""The end of a fit: the last steps to its optimum, and differences that know it for one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from compass_ros.calibration.least_squares import (
+    Fit,
+    Linear,
+    Point,
+    broyden,
+    central,
+    cost,
+    damped_step,
+    difference_steps,
+    move_between,
+    normal_equations,
+    robust_weight,
+)
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.valleys import along_valleys
+from compass_ros.types import Floats, Ints
+
+SETTLING = 6
+"""How often differences are taken at the end, at most."""
+SERVE = 8
+"""Steps that they serve, at most."""
+FINE = (0.1, 0.03)
+"""Lengths of these differences, in turn, as shares of those that move the residual by one sigma. The short ones are
+exact; the long ones see past what the simulator's steps at contacts do to a short one."""
+SETTLED = 0.3
+"""Fall of the cost [log likelihood] by a step, or by all steps with the same differences, that is the last one."""
+WORTHWHILE = 0.05
+"""Share of what is left above the noise that all steps with the same differences must gain: where something else
+differs, exact values are of no use."""
+_DAMPING = (1e-9, 1e-3, 1e-2, 1e-1, 1.0, 1e1)
+"""Damping factors that are tried at once at the end."""
+
+
+def settled(likelihood: Likelihood, fit: Fit, rounds: int = 2) -> Fit:
+    """The last steps to the optimum: Gauss-Newton with short central differences, which serve several steps.
+
+    Along a valley that coupled parameters share, their effects cancel to a hundredth. Differences that are wrong by
+    some per cent, as those of `minimise` are, end there, tens of log likelihood above the optimum. What a step has
+    shown is added to them (Broyden): the shapes of a field bend the valley. `rounds`: of differences, at least.
+    """
+    free, robust, linear = fit.free, fit.robust, fit.linear
+    point = replace(fit.point, cost=float(cost(likelihood, [fit.point], robust)[0][0]))
+    for taken in range(SETTLING):
+        steps = FINE[taken % len(FINE)] * difference_steps(linear)
+        linear = central(likelihood, point, free, steps, linear.onset if taken else None)
+        linear = along_valleys(likelihood, point, linear, free, robust)
+        before = point.cost
+        for _ in range(SERVE):
+            best, residual = _best_step(likelihood, point, linear, free, robust)
+            step = point.cost - best.cost
+            if step <= 0:
+                break
+            linear = broyden(linear, residual, move_between(likelihood, point, best, free))
+            point = best
+            if step < SETTLED:
+                break
+        unexplained = point.cost - 0.5 * likelihood.measurements
+        if taken >= rounds - 1 and before - point.cost < max(SETTLED, WORTHWHILE * unexplained):
+            break
+    return stationary(likelihood, replace(fit, point=point, linear=linear))
+
+
+def _best_step(likelihood: Likelihood, point: Point, linear: Linear, free: Ints, robust: float) -> tuple[Point, Floats]:
+    """The best of some damped steps, with its residual."""
+    hessian, gradient = normal_equations(likelihood, point, linear, free, robust)
+    trials = [damped_step(likelihood, point, free, hessian, gradient, damping) for damping in _DAMPING]
+    costs, residuals = cost(likelihood, trials, robust)
+    best = int(np.argmin(costs))
+    return replace(trials[best], cost=float(costs[best])), residuals[best]
+
+
+def stationary(likelihood: Likelihood, fit: Fit) -> Fit:
+    """The same with the least change of its differences by which the optimum is one.
+
+    No step lowered the cost, so its derivative there is zero, but for values that a bound holds back. Differences that
+    are wrong by a per cent have another one where the effects of coupled parameters cancel, and to first order promise
+    a fit that is better by hundreds of log likelihood. Each column loses its gradient along the weighted residual.
+    """
+    linear, point = fit.linear, fit.point
+    _, gradient = normal_equations(likelihood, point, linear, fit.free, fit.robust)
+    p, values = len(fit.free), point.values[fit.free]
+    of_all, own = gradient[:p], gradient[p:].reshape(len(linear.residual), -1)
+    outward = ((values <= likelihood.low[fit.free]) & (of_all > 0)) | (
+        (values >= likelihood.high[fit.free]) & (of_all < 0)
+    )
+    squares = np.sum(robust_weight(linear.residual, fit.robust) * linear.residual**2, axis=(1, 2))  # (E,)
+    of_all = np.where(outward, 0.0, of_all) / max(float(squares.sum()), 1e-300)
+    own = own / np.maximum(squares, 1e-300)[:, None]
+    jacobian = linear.jacobian - linear.residual[..., None] * of_all
+    launch = linear.launch_jacobian - linear.residual[..., None] * own[:, None, None, :]
+    return replace(fit, linear=replace(linear, jacobian=jacobian, launch_jacobian=launch))

@@ -1,0 +1,147 @@
+"""Models with one law more, or with another one in the place of one: ranked to first order, the best of them fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import log
+
+import numpy as np
+
+from compass_ros.discovery.candidates import Candidate
+from compass_ros.discovery.discrepancy import to_first_order
+from compass_ros.discovery.first_order import FirstOrder, Ranked
+from compass_ros.discovery.fits import Begun, from_parent, race, telling, whole, without
+from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.odds import Known, Prior
+from compass_ros.discovery.scatter import ranked_scatter, with_scatter
+from compass_ros.simulation.effects import Attached
+from compass_ros.simulation.sites import PLANAR
+from compass_ros.types import Floats
+
+RACED = 4
+"""Neighbours that are fitted from their parent: a budget."""
+STEPS = 4
+"""Gauss-Newton steps of each fit from its parent: a budget."""
+SLIGHT = 0.01
+"""Probability that is left to models that are not brought to their optimum: a budget. It is the
+default false-alarm rate and does not follow that setting."""
+
+
+def rank(first: FirstOrder, candidates: Sequence[Candidate]) -> list[Ranked]:
+    """Laws at their best shape, the one that promises most first.
+
+    Joints, drives, pairs and signals have each a size of their own too; what moves in one plane has a law in common or
+    alone.
+    """
+    of_chance = [ranked_scatter(first.response, c) for c in candidates if c.attached.effect.scattered]
+    found = [best for c in candidates if not c.attached.effect.scattered for best in first.ranked(c)[:1]]
+    moving, alone = first.response.simulator.moving, dict[str, list[Ranked]]()
+    for one in found:
+        own = [moving[name].kind for name in one.candidate.objects if name in moving]
+        alike = one.candidate.attached.effect.moves and any(kind in PLANAR for kind in own)
+        own_size = not one.candidate.attached.effect.apart and bool(one.candidate.objects) and not alike
+        if one.candidate.alone and one.gain > 0 and own_size:
+            alone.setdefault(one.candidate.name, []).append(one)
+    several = (first.together(singles) for singles in alone.values() if len(singles) > 1)
+    return sorted([*found, *of_chance, *(one for one in several if one)], key=lambda f: -f.gain)
+
+
+def widen(known: Known, best: Hypothesis, ranked: Sequence[Ranked], called: bool) -> None:
+    """Fit the neighbours of a model with one law more; from where nothing is bent, where more is `called` for.
+
+    They are fitted to some episodes, and the best of them to all.
+    """
+    rows = telling(best)
+    tried, few = promising(ranked, best)[:RACED], len(rows) < len(best.likelihood.inputs)
+    if best.laws and not few:
+        tried = [r for r, odds in zip(tried, beside(best, tried, known.prior), strict=True) if odds > 0]
+    known.take(with_scatter(best, r) for r in tried if r.candidate.attached.effect.scattered)
+    begun = [from_parent(best, r, rows, STEPS) for r in tried if not r.candidate.attached.effect.scattered]
+    if called and few:  # what takes all episodes to tell hardly bends a fit
+        begun += race(best, cold_starts(ranked, best), rows)
+    known.take(whole(best, one) for one in probable(begun, known.prior))
+
+
+def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str]) -> None:
+    """Fit models with another law in the place of one of the best model's, until none is better.
+
+    The first law that was taken stood for all that differs; beside the second one another may stand for the rest.
+    `widened`: names of models whose neighbours were fitted; those of this search are added.
+    """
+    leader = None
+    while known.ordered and known.ordered[0][0] is not leader:
+        leader, odds = known.ordered[0]
+        for name in dict.fromkeys(a.effect.name for a in leader.laws):
+            own = [a for a in leader.laws if a.effect.name == name]
+            if len(own) == len(leader.laws):
+                continue
+            less = without(leader, own)
+            if less.name not in widened:
+                widened.add(less.name)
+                known.take([less])
+                ranked = rank(FirstOrder(less.response), candidates)
+                least = odds - known.models[less.name][1]
+                widen(
+                    known, less, [r for r in ranked if r.gain + known.prior.of_laws([r.candidate.name]) > least], False
+                )
+
+
+def beside(model: Hypothesis, ranked: Sequence[Ranked], prior: Prior) -> list[float]:
+    """Log odds, to first order, of a model with one law more against the model with its discrepancy."""
+    of_form = [r for r in ranked if not r.candidate.attached.effect.scattered]
+    rises = iter(to_first_order(model.response, model.sizes, [r.columns for r in of_form]))
+    return [(next(rises) if r in of_form else r.gain) + prior.of_laws([r.candidate.name]) for r in ranked]
+
+
+def probable(begun: Sequence[Begun], prior: Prior) -> list[Begun]:
+    """Those that could be probable, and the best two in any case; one of each set of laws on the same sites.
+
+    By the likelihood and the prior odds: what shapes cost is of the size of the margin.
+    """
+    best: dict[frozenset[tuple[str, tuple[str, ...]]], tuple[float, Begun]] = {}
+    for one in begun:
+        odds = prior.of_laws(a.effect.name for a in one.laws) - one.cost
+        sites = frozenset((a.effect.name, a.objects) for a in one.laws)
+        if sites not in best or odds > best[sites][0]:
+            best[sites] = odds, one
+    ordered = sorted(best.values(), key=lambda pair: -pair[0])
+    least = ordered[0][0] + 2 * log(SLIGHT) if ordered else 0.0
+    return [one for i, (odds, one) in enumerate(ordered) if i < 2 or odds > least]
+
+
+def promising(ranked: Sequence[Ranked], parent: Hypothesis) -> list[Ranked]:
+    """Those that the parent does not have on any of their sites; of each name the best two choices of sites."""
+    has = {(a.effect.name, site) for a in parent.laws for site in a.named}
+    out: list[Ranked] = []
+    for r in ranked:
+        own = {(r.candidate.name, site) for part in r.candidate.parts for site in part.named}
+        if r.gain > 0 and not own & has and sum(o.candidate.name == r.candidate.name for o in out) < 2:
+            out.append(r)
+    return out
+
+
+def cold_starts(ranked: Sequence[Ranked], parent: Hypothesis) -> list[tuple[tuple[Attached, ...], Floats]]:
+    """Each law that the parent lacks, on the sites that promise most, at a modest size.
+
+    One that promises nothing about a fit that is bent says nothing of its sites either: it starts on all of them.
+    """
+    has = {a.effect.name for a in parent.laws}
+    of: dict[str, list[Ranked]] = {}
+    for r in ranked:
+        if r.candidate.name not in has and not r.candidate.attached.effect.scattered:
+            of.setdefault(r.candidate.name, []).append(r)
+    out = []
+    for same in of.values():
+        pairs = [r for r in same if r.candidate.alone and r.candidate.attached.effect.paired]
+        chosen = pairs if same[0].gain <= 0 and pairs else same[:1]
+        parts = tuple(part for r in chosen for part in r.candidate.parts)
+        out.append((parts, np.concatenate([modest(r) for r in chosen])))
+    return out
+
+
+def modest(ranked: Ranked) -> Floats:
+    """(q,) numbers: amplitudes at their modest sizes, shapes as first order has them or where they begin."""
+    quantities = ranked.candidate.quantities
+    sizes = [q.begins + q.scale if q.amplitude else (n if ranked.gain > 0 else q.start)
+             for q, n in zip(quantities, ranked.numbers, strict=True)]  # fmt: skip
+    return np.array(sizes)
