@@ -127,7 +127,7 @@ SHUTTER = Law(
     _PHASES,
     draw=_rows,
     camera=_shutter,
-    library=lambda size, shape: {"time": 0.005 * size * shape["hand"]},
+    library=lambda size, shape: {"y": 0.005 * size * shape["hand"] / _HALF_WIDTH},
     most=10.0,
 )
 

@@ -196,18 +196,37 @@ class FirstOrder:
     # --- laws of contacts, commands and signals
 
     def _rolled_out(self, candidate: Candidate) -> list[Ranked]:
+        found = (self._grown(candidate, shapes) for shapes in self._shapes_seen(candidate))
+        return [one for one in found if one]
+
+    def _shapes_seen(self, candidate: Candidate) -> list[Floats]:
+        """(q,) shapes of a law of a sensor that has to be searched; of another one where its search begins."""
+        quantities, effect = candidate.quantities, candidate.attached.effect
+        if effect.sensing is None or not any(q.grid for q in quantities):
+            return [np.array([0.0 if q.amplitude else q.start for q in quantities])]
+        low, high, scale = _bounds(candidate)
+        law, steps = self.response.bent(candidate.attached), np.zeros((len(scale), len(quantities)))
+        steps[:, candidate.amplitudes] = np.diag(scale)
+
+        def gain(shapes: Floats) -> float:
+            per_unit = np.stack([law(shapes + step) for step in steps], axis=2) / scale
+            return best_sizes(*self.of_columns(per_unit), low, high, WIDTH * scale)[1]
+
+        return best_shapes(quantities, gain, STARTS, EVALUATIONS)
+
+    def _grown(self, candidate: Candidate, shapes: Floats) -> Ranked | None:
         """With steps that are doubled until they do twice as much: limits do nothing, then a lot.
 
         They are taken downwards where there is no room above zero.
         """
         low, high, scale = _bounds(candidate)
-        amplitudes, quantities = candidate.attached.amplitudes, candidate.attached.effect.quantities
+        amplitudes = candidate.attached.amplitudes
         begins = candidate.begins[amplitudes]
         found: list[Ranked] = []
         up = high >= scale
         steps, most, before = np.where(up, scale, -scale), np.where(up, high, -low), 0.0
         while np.all(np.abs(steps) <= most):
-            settings = np.tile([0.0 if q.amplitude else q.start for q in quantities], (len(steps), 1))
+            settings = np.tile(shapes, (len(steps), 1))
             settings[:, amplitudes] = np.diag(begins + steps)
             change = self.response.changes(candidate.attached, settings)
             per_unit = change / steps
@@ -219,7 +238,7 @@ class FirstOrder:
             if _FELT < done < _TWICE * before:
                 break
             steps, before = 2.0 * steps, done
-        return [max(found, key=lambda f: f.gain)] if found else []
+        return max(found, key=lambda f: f.gain, default=None)
 
 
 def _bounds(candidate: Candidate) -> tuple[Floats, Floats, Floats]:

@@ -198,7 +198,7 @@ class Response:
     def changes(self, attached: Attached, numbers: Floats) -> Floats:
         """(E, D, n) changes of the residual by (n, q) numbers of one more law, from rollouts.
 
-        A sensor that does not look ahead needs none: the motion is as it was.
+        A sensor that does not look ahead needs none, unless first places were read from it: the motion is as it was.
         """
         point, likelihood = self.fit.point, self.likelihood
         with_it = self.simulator.with_effects([*self.simulator.effects, attached])
@@ -206,13 +206,38 @@ class Response:
         values = np.concatenate([np.tile(point.values, (len(numbers), 1)), numbers], axis=1)
         inputs = np.tile(likelihood.inputs + point.launch, (len(numbers), 1))
         asked = np.repeat(values, episodes, axis=0), inputs, likelihood.time_s[index]
-        if attached.effect.sensing is not None and attached.effect.ahead is None:
+        same = np.array_equal(with_it.physics.truly(*asked[:2]), inputs[:, : len(self.simulator.cell.input_names)])
+        if attached.effect.sensing is not None and attached.effect.ahead is None and same:
             predicted = with_it.sensed(*asked, np.tile(self._motion, (len(numbers), 1, 1)))
         else:
             predicted = with_it.observe(*asked)
         there = np.nan_to_num(likelihood.difference(predicted, likelihood.measured[index]) / likelihood.sigma[index])
         change = there.reshape(len(numbers), episodes, -1) - self.tangent.residual
         return np.moveaxis(change, 0, 2)
+
+    def bent(self, attached: Attached) -> Callable[[Floats], Floats]:
+        """A law of a sensor that looks at no other time, as a function of its (q,) numbers: (E, D) changes of the
+        residual; with the first places that were read from it, to first order."""
+        sensing, physics, likelihood = attached.effect.sensing, self.simulator.physics, self.likelihood
+        assert sensing is not None
+        inputs = likelihood.inputs + self.fit.point.launch
+        values = np.tile(self.fit.point.values, (len(inputs), 1))
+        context = physics.context(attached.sites(physics.places), values)
+        plain = self.simulator.sensed(values, inputs, likelihood.time_s, self._motion)
+
+        told, std = inputs[:, : len(likelihood.launch_std)], likelihood.launch_std
+        wider = self.simulator.with_effects([*self.simulator.effects, attached]).physics
+        read, random = physics.truly(values, told), std > 0
+
+        def change(numbers: Floats) -> Floats:
+            of = np.tile(numbers, (len(plain), 1))
+            predicted = sensing(lambda _: plain, of, context)(likelihood.time_s)
+            there = np.nan_to_num(likelihood.difference(predicted, likelihood.measured) / likelihood.sigma)
+            begins = (wider.truly(np.concatenate([values, of], axis=1), told) - read)[:, random] / std[random]
+            moved = (self.tangent.own @ begins[:, :, None])[..., 0]
+            return np.asarray(there.reshape(len(plain), -1) - self.tangent.residual + moved)
+
+        return change
 
 
 def respond(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> Response:

@@ -58,7 +58,8 @@ def on_signals(effect: Effect, simulator: Simulator, visited: Visited) -> Iterat
     """
     places = simulator.places
     if simulator.accepts(effect, ()):
-        yield Attached(effect, ())
+        of_camera = effect.on == ("camera",) and effect.on_signal is not None
+        yield Attached(effect.at(visited.camera_size()) if of_camera else effect, ())
     sensors = list(_sensors(effect, simulator.cell, places))
     for sites in sensors if effect.by_name or len(sensors) > 1 else ():
         yield Attached(effect.at(visited.signal_size(sites[0])), tuple(site.name for site in sites))

@@ -43,10 +43,9 @@ def where_of(laws: Sequence[Attached], numbers: Floats, movers: Sequence[str]) -
     one = " and ".join(objects) if told else "all"
     names = [q.name for q in effect.quantities]
     region = None
-    if "centre_x" in names:
-        centre = (float(numbers[names.index("centre_x")]), float(numbers[names.index("centre_y")]))
-        size = names.index("radius" if "radius" in names else "core")
-        region = Region(centre, float(numbers[size]))
+    if (size := next((n for n in ("radius", "core") if n in names), None)) is not None and "centre_x" in names:
+        x, y, far = (float(numbers[names.index(name)]) for name in ("centre_x", "centre_y", size))
+        region = Region((x, y), far)
     return Where(one, phase, effect.channel, region)
 
 

@@ -70,6 +70,10 @@ class SignalSize:
     unit: str
     spread: float
     """Standard deviation of a number around its mean, the largest of them."""
+    middle: tuple[float, ...] = ()
+    """Of what a camera sees: between the ends of its x, y and z [m]; without z where all lies in one plane."""
+    reach: float = 0.0
+    """Of the same: the largest distance of an end from there [m]."""
 
 
 Size = JointSize | DriveSize | BodySize | PairSize | SignalSize
@@ -128,6 +132,16 @@ def signal_size(site: Site, measured: Floats) -> SignalSize:
     return SignalSize(site.kind, site.units[0], float(np.nanstd(measured[..., list(site.columns)], axis=(0, 1)).max()))
 
 
+def camera_size(sites: Sequence[Site], measured: Floats, noise: float) -> SignalSize:
+    """Of all that a camera sees, in (E, F, C) measured rows; noise [m]: less than it nobody sees along z."""
+    axes = [[s.columns[i] for s in sites if i < len(s.columns)] for i in range(3)]
+    ends = [(np.nanmin(measured[..., own]), np.nanmax(measured[..., own])) for own in axes if own]
+    half = [float(high - low) / 2 for low, high in ends]
+    seen = 2 if len(ends) < 3 or 2 * half[2] < noise else 3
+    middle = tuple(float(high + low) / 2 for low, high in ends[:seen])
+    return SignalSize("camera", "m", max(half), middle, max(*half, noise))
+
+
 def standing(model: mujoco.MjModel) -> BodySize:
     """A body that never moves, as one of a pair."""
     return BodySize("body", np.inf, np.inf, 0.0, 0.0, 0.0, float(np.linalg.norm(model.opt.gravity)))
@@ -149,6 +163,8 @@ def unit_sizes(kind: SiteKind) -> tuple[Size, ...]:
         return (unit_joint(kind),)
     if kind in DRIVES:
         return tuple(DriveSize(kind, 1.0, unit) for unit in COMMAND_UNITS)
+    if kind == "camera":
+        return tuple(SignalSize(kind, "m", 1.0, axes * (0.0,), 1.0) for axes in (3, 2))
     if kind in SIGNALS:
         return tuple(SignalSize(kind, unit, 1.0) for unit in SIGNAL_UNITS)
     if kind in PAIRS:

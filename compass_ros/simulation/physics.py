@@ -15,11 +15,15 @@ from compass_ros.cells.dynamics import Dynamics
 from compass_ros.cells.rotors import rotors
 from compass_ros.cells.sensors import units_of
 from compass_ros.cells.signals import Signal
+from compass_ros.cells.start import input_names, positions_in_state
 from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.effect import Context, Sample, restore, table_friction
 from compass_ros.simulation.native.program import Term
 from compass_ros.simulation.sites import Places, Site, SiteKind
-from compass_ros.types import Bools, Floats, Parameter
+from compass_ros.types import Bools, Floats, Ints, Parameter
+
+Acting = tuple[Attached, Floats, tuple[Site, ...]]
+"""An effect, its numbers and what it acts on."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +76,7 @@ class Physics:
             at += size
         return out
 
-    def acting(self, values: Floats) -> list[tuple[Attached, Floats, tuple[Site, ...]]]:
+    def acting(self, values: Floats) -> list[Acting]:
         """The same with the sites of each."""
         return [(*one, sites) for one, sites in zip(self.of_effects(values), self._sites, strict=True)]
 
@@ -83,10 +87,9 @@ class Physics:
     def context(self, sites: tuple[Site, ...], values: Floats) -> Context:
         """What the hooks of an effect on some sites are told."""
         bodies = [signal for signal in self.cell.signals if signal_kind(signal) == "camera"]
-        planes = tuple((signal.first, signal.first + 1) for signal in bodies)
-        positions = tuple(c for s in bodies for c in range(s.first, s.first + min(s.size, 3)))
+        columns = [tuple(range(s.first, s.first + s.size)) for s in bodies]
         sliding = {s.body: s for s in self.dynamics.sliding(self.of_cell(values))}
-        return Context(sites, sliding, planes, positions, self.time_step)
+        return Context(sites, sliding, tuple(c[:3] for c in columns), tuple(c[3:] for c in columns), self.time_step)
 
     def write(self, models: Sequence[mujoco.MjModel], values: Floats) -> None:
         """Parameters and effects into B models. What MuJoCo derives from them (mj_setConst) is the caller's."""
@@ -112,13 +115,42 @@ class Physics:
         nq, nv = self.model.nq, self.model.nv
         start = np.tile(self.dynamics.first, (len(values), 1))
         start[:, 1 : 1 + nq], start[:, 1 + nq : 1 + nq + nv] = self.dynamics.start(
-            self.of_cell(values), self.of_command(inputs)
+            self.of_cell(values), self.truly(values, self.of_command(inputs))
         )
         self.drives.begin(start[:, 1 : 1 + nq], self.of_cell(values), self.of_command(inputs), self.bank)
         for joint, rotor in rotors(self.model):  # in the middle of its play
             for first, places in ((1, self.model.jnt_qposadr), (1 + nq, self.model.jnt_dofadr)):
                 start[:, first + places[rotor]] = start[:, first + places[joint]]
         return start
+
+    @cached_property
+    def _read(self) -> tuple[Ints, Ints]:
+        """Inputs that say where what a camera sees begins, and the columns of an observation they were read from."""
+        inputs: list[int] = []
+        columns: list[int] = []
+        at = len(self.cell.action)
+        for spec in self.cell.starts:
+            signal = self.cell.signal(spec.object)
+            count = positions_in_state(signal) if signal_kind(signal) == "camera" else 0
+            inputs += range(at, at + count)
+            columns += range(signal.first, signal.first + count)
+            at += len(input_names(spec, signal))
+        return np.array(inputs, int), np.array(columns, int)
+
+    def truly(self, values: Floats, inputs: Floats) -> Floats:
+        """(B, A) inputs with first places as they are, where cameras with laws said what was read, to second order."""
+        at, columns = self._read
+        laws = [one for one in self.acting(values) if one[0].effect.sensing is not None and one[0].present(one[1])]
+        if not (len(at) and laws):
+            return inputs
+        rows = np.zeros((len(inputs), 1, len(self.cell.channels)))
+        rows[:, 0, columns] = inputs[:, at]
+        still, out = np.zeros((len(inputs), 1)), inputs.copy()
+        for _ in range(2):
+            sample = self._through(laws, values, partial(_always, rows.copy()))
+            rows[:, 0, columns] = inputs[:, at] - (sample(still) - rows)[:, 0, columns]
+        out[:, at] = rows[:, 0, columns]
+        return out
 
     def controls(self, values: Floats, inputs: Floats, steps: int) -> Floats | None:
         """(B, T, n) what drives MuJoCo (`drives.parts`), controls as actuators follow them; None where nothing does."""
@@ -170,16 +202,24 @@ class Physics:
         def perfect(time: Floats) -> Floats:
             return interpolate(states, self.time_step, self.cell.simulated_time(self.of_command(inputs), time), observe)
 
-        sample: Sample = perfect
-        for attached, numbers, sites in self.acting(values):
+        return np.asarray(self._through(self.acting(values), values, perfect)(time_s))
+
+    def _through(self, laws: Sequence[Acting], values: Floats, sample: Sample) -> Sample:
+        """What sensors with some laws make of what perfect ones say."""
+        for attached, numbers, sites in laws:
             if attached.effect.sensing is not None:
                 sensed = attached.effect.sensing(sample, numbers, self.context(sites, values))
                 sample = _where(self._of_signals(sites), sensed, sample)
-        return np.asarray(sample(time_s))
+        return sample
 
     def _of_signals(self, sites: tuple[Site, ...]) -> Bools:
         """(C,) which columns of an observation belong to some signals."""
         return np.isin(np.arange(len(self.cell.channels)), [c for site in sites for c in site.columns])
+
+
+def _always(rows: Floats, time: Floats) -> Floats:
+    """(B, 1, C) rows whatever the time."""
+    return np.broadcast_to(rows, (*time.shape, rows.shape[2]))
 
 
 def signal_kind(signal: Signal) -> SiteKind:

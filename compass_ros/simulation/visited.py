@@ -15,6 +15,7 @@ from compass_ros.simulation.extents import (
     Path,
     SignalSize,
     body_size,
+    camera_size,
     pair_size,
     paths,
     signal_size,
@@ -88,6 +89,12 @@ class Visited:
     def signal_size(self, site: Site) -> SignalSize:
         """Of what is measured, as the simulator has it."""
         return signal_size(site, self._observed)
+
+    def camera_size(self) -> SignalSize:
+        """Of all that a camera sees, as the simulator has it."""
+        simulator = self._simulator
+        bodies = [s for s in simulator.places.signals if s.kind == "camera" and len(s.columns) > 1]
+        return camera_size(bodies, self._observed, simulator.cell.spec.noise_m)
 
     def drive_forces(self) -> Floats:
         """(nu,) the largest force of each actuator."""

@@ -92,7 +92,7 @@ def _library(name: str, own: Ingredient, base: Played) -> Floats:
         terms = {"k1": 0.05 * own.size * own.shape["hand"]}
     if name == "off_centre_mass":
         terms["arm"] = 0.0  # with the formula of the library the lump's inertia is left out
-    numbers = np.array([[terms[q.name] for q in effect.quantities]] * len(INPUTS))
+    numbers = np.array([[0.0 if q.later else terms[q.name] for q in effect.quantities]] * len(INPUTS))
     if name == "stroke_jitter":
         numbers = np.array([[0.005 * own.size * own.shape[f"shot_{i}"]] for i in range(len(INPUTS))])
     values = np.hstack([np.tile(cell().defaults, (len(INPUTS), 1)), numbers])

@@ -226,7 +226,8 @@ def test_a_camera_sees_bodies_and_an_encoder_joints(tmp_path: Path) -> None:
     ):
         candidate, *alone = [c for c in asked(simulator, none) if c.name == name]
         assert [c.attached.objects for c in alone] == ([("pole",), ("ball",)] if name == "clock_drift" else [])
-        seen = simulator.with_effects([candidate.attached]).observe(np.array([[0.05]]), none, time)[0]
+        numbers = np.array([[0.05 if q.amplitude else q.start for q in candidate.quantities]])
+        seen = simulator.with_effects([candidate.attached]).observe(numbers, none, time)[0]
         changed = np.abs(seen - plain).max(axis=0) > 0
         others = np.isin(np.arange(4), own, invert=True)
         assert not changed[others].any()

@@ -72,8 +72,8 @@ def test_parameters_of_effects_follow_those_of_the_cell() -> None:
     )
     names = [p.name for p in both.parameters[64:]]
     assert names == [*(f"puck1+puck2@swirl@{q}" for q in ("strength", "centre_x", "centre_y", "radius", "tail")),
-                     "cell@camera_scale@scale"]  # fmt: skip
-    assert both.defaults[64:].tolist() == [0.0, 0.0, 0.0, 0.12, 0.5, 0.0]
+                     *(f"cell@camera_scale@{q}" for q in ("scale", "centre_x", "centre_y", "centre_z"))]  # fmt: skip
+    assert both.defaults[64:].tolist() == [0.0, 0.0, 0.0, 0.12, 0.5, *4 * [0.0]]
 
 
 @pytest.mark.parametrize(

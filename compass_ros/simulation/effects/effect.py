@@ -38,6 +38,8 @@ class Quantity:
     """Where a search begins; for shapes."""
     later: bool = False
     """Whether files were written before the law had it; it is zero in them."""
+    formerly: tuple[str, str, float] | None = None
+    """Its name, unit and what one of that unit is now, in files that say it in another way."""
     begins: float = 0.0
     """Up to where an amplitude does nothing in what was seen: of a limit, where it is the largest that was reached."""
     grid: int = 0
@@ -47,14 +49,15 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Context:
-    """What the cell knows of itself, for hooks. Columns: of an observation; pairs (x, y) in the plane."""
+    """What the cell knows of itself, for hooks. Columns: of an observation."""
 
     sites: tuple[Site, ...]
     """What the effect acts on; drives one at a time."""
     sliding: Mapping[str, Sliding]
-    planes: tuple[tuple[int, int], ...]
-    positions: tuple[int, ...]
-    """Columns that are positions of bodies [m]."""
+    places: tuple[tuple[int, ...], ...]
+    """Columns of where each body that a camera sees is [m]: x and y, or x, y and z."""
+    turns: tuple[tuple[int, ...], ...]
+    """Columns of how each of them is turned: a quaternion with the scalar first, or none."""
     time_step: float
     before: Floats | None = None
     """(B, n) what a drive of n components was told before the first command; None: zeros."""

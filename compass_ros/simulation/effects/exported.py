@@ -116,14 +116,26 @@ def read_effects(path: Path | str) -> Exported:
 
 
 def _fitted(entry: _Entry, path: Path | str) -> FittedEffect:
-    found = {name: value.unit for name, value in entry.values.items()}
+    values = _renamed(entry)
+    found = {name: value.unit for name, value in values.items()}
     variants = _variants(entry, path)
     kind = next((v for v in variants if _units(v) == _later(v, found) | found), variants[0])
     if (expected := _units(kind)) != _later(kind, found) | found:
         raise ConfigError(f"{path}: {entry.name}: expected values with units {expected}, found {shown(found)}")
-    given = [entry.values.get(q.name, _Value(value=0.0, unit=q.unit)) for q in kind.quantities]
+    given = [values.get(q.name, _Value(value=0.0, unit=q.unit)) for q in kind.quantities]
     std = tuple(float("nan") if v.std is None else v.std for v in given)
     return FittedEffect(Attached(kind, entry.objects), tuple(v.value for v in given), std)
+
+
+def _renamed(entry: _Entry) -> dict[str, _Value]:
+    """Values by the names and in the units that they have now."""
+    out = dict(entry.values)
+    for q in effect(entry.name).quantities:
+        name, unit, factor = q.formerly or ("", "", 1.0)
+        if name in out and out[name].unit == unit:
+            value, std = out[name].value, out.pop(name).std
+            out[q.name] = _Value(value=factor * value, unit=q.unit, std=None if std is None else factor * std)
+    return out
 
 
 def _variants(entry: _Entry, path: Path | str) -> list[Effect]:

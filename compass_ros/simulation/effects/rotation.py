@@ -34,13 +34,13 @@ def _sensing(sample: Sample, numbers: Floats, context: Context) -> Sample:
                 triple = list(vectors[first : first + 3])
                 out[:, :, triple] = np.einsum("bij,bfj->bfi", matrix, seen[:, :, triple])
             if len(site.columns) == _POSE:
-                out[:, :, site.columns[3:]] = _product(quaternion, seen[:, :, site.columns[3:]])
+                out[:, :, site.columns[3:]] = product(quaternion, seen[:, :, site.columns[3:]])
         return np.where(absent, seen, out)
 
     return rotated
 
 
-def _product(one: Floats, other: Floats) -> Floats:
+def product(one: Floats, other: Floats) -> Floats:
     """(B, F, 4) of a (B, 1, 4) quaternion with the scalar last and (B, F, 4) with it first, as these are."""
     v, w, scalar, vector = one[..., :3], one[..., 3:], other[..., :1], other[..., 1:]
     along = np.sum(v * vector, axis=-1, keepdims=True)

@@ -27,7 +27,7 @@ def seen(name: str, numbers: float | tuple[float, ...], sample: Sample = line) -
     """(30, 4) what the sensor says at TIME."""
     hook = effect(name).sensing
     assert hook is not None
-    context = Context((), {}, ((0, 1), (2, 3)), (0, 1, 2, 3), 0.001)
+    context = Context((), {}, ((0, 1), (2, 3)), ((), ()), 0.001)
     return np.asarray(hook(sample, np.atleast_2d(numbers), context)(TIME)[0])
 
 
@@ -60,13 +60,13 @@ def test_a_lens_moves_points_outwards_by_the_cube_of_their_distance() -> None:
 
 
 def test_a_rolling_shutter_shows_each_row_at_its_own_time() -> None:
-    """At +half the width the full time later, at -half the width as much earlier; the pucks by themselves."""
+    """At 0.225 m off row zero later, on its other side earlier; the pucks by themselves."""
 
     def across(time: Floats) -> Floats:
         moving = 0.4 * time
         return np.stack([moving, 0 * time + 0.225, moving, 0 * time - 0.1125], axis=2)
 
-    shown = seen("rolling_shutter", 0.02, across)
+    shown = seen("rolling_shutter", (0.0, 0.02 / 0.225), across)
     np.testing.assert_allclose(shown[:, 0], 0.4 * (TIME[0] + 0.02), atol=1e-15)
     np.testing.assert_allclose(shown[:, 2], 0.4 * (TIME[0] - 0.01), atol=1e-15)
 
@@ -109,7 +109,7 @@ def test_a_sensor_that_looks_ahead_finds_the_motion_there() -> None:
 
 def test_the_motion_itself_is_left_alone() -> None:
     blurred = Simulator(cell(), [Attached(EFFECTS["camera_rotation"], ())], threads=1)
-    turned = blurred.motion(np.append(cell().defaults, 0.1)[None], DESCRIBED[None], 0.5).positions
+    turned = blurred.motion(np.append(cell().defaults, [0.1, 0.0, 0.0])[None], DESCRIBED[None], 0.5).positions
     assert (turned == simulator().motion(values(), DESCRIBED[None], 0.5).positions).all()
 
 
@@ -118,7 +118,7 @@ def test_each_rollout_has_its_own_number(name: str) -> None:
     hook = effect(name).sensing
     assert hook is not None
     vector = Site("sensor", ("it",), columns=(0, 1, 2))
-    context = Context((vector,), {}, ((0, 1), (2, 3)), (0, 1, 2, 3), 0.001)
+    context = Context((vector,), {}, ((0, 1), (2, 3)), ((), ()), 0.001)
     amount, *shapes = effect(name).quantities
     numbers = np.array([[size, *(q.start for q in shapes)] for size in (0.0, amount.high)])
     both = hook(line, numbers, context)(np.tile(TIME, (2, 1)))
