@@ -212,7 +212,7 @@ class FirstOrder:
             per_unit = np.stack([law(shapes + step) for step in steps], axis=2) / scale
             return best_sizes(*self.of_columns(per_unit), low, high, WIDTH * scale)[1]
 
-        return best_shapes(quantities, gain, STARTS, EVALUATIONS)
+        return best_shapes(quantities, gain, STARTS, EVALUATIONS, smooth=True)
 
     def _grown(self, candidate: Candidate, shapes: Floats) -> Ranked | None:
         """With steps that are doubled until they do twice as much: limits do nothing, then a lot.

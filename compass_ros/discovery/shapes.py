@@ -16,12 +16,17 @@ APART = 0.1
 
 
 def best_shapes(
-    quantities: Sequence[Quantity], gain: Callable[[Floats], float], starts: int, evaluations: int
+    quantities: Sequence[Quantity],
+    gain: Callable[[Floats], float],
+    starts: int,
+    evaluations: int,
+    smooth: bool = False,
 ) -> list[Floats]:
     """(q,) shapes that gain most, each in its neighbourhood, the best first; zeros for amplitudes.
 
     A grid, then simplexes from `starts` points of which no two are neighbours in the grid: they lead to different
-    places. `evaluations`: of each simplex, for each shape.
+    places. `evaluations`: of each simplex, for each shape. `smooth`: the gain has slopes, which lead on where there are
+    more shapes than a simplex can turn about.
     """
     shape_of = [i for i, q in enumerate(quantities) if not q.amplitude]
     if not shape_of:
@@ -43,18 +48,22 @@ def best_shapes(
     for i in np.argsort(falls, kind="stable"):
         if len(begun) < starts and all(np.abs(nodes[i] - nodes[k]).max() > 1 for k in begun):
             begun.append(int(i))
-    bounds = [(quantities[i].low, quantities[i].high) for i in shape_of]
+    bounds = np.array([(quantities[i].low, quantities[i].high) for i in shape_of])
+    wide = np.ptp(bounds, axis=1)
     options = {"maxfev": evaluations * len(shape_of), "xatol": 1e-4, "fatol": 1e-2}
     searched = [bool(quantities[i].grid) for i in shape_of]
 
     def down(point: Floats) -> OptimizeResult:
         """Where all shapes are searched on grids, from a simplex within these; else from SciPy's own."""
+        if smooth:
+            found = minimize(lambda x: fall(x * wide), point / wide, method="L-BFGS-B", bounds=bounds / wide[:, None])
+            return OptimizeResult(x=found.x * wide, fun=found.fun)
         near = [0.5 * float(np.diff(grid)[0]) for grid in grids] if all(searched) else []
         corners = {"initial_simplex": np.vstack([point, point + np.diag(near)])} if near else {}
         return minimize(fall, point, method="Nelder-Mead", bounds=bounds, options=options | corners)
 
     found = [down(points[i]) for i in begun]
-    apart = APART * np.ptp(bounds, axis=1)
+    apart = APART * wide
     best: list[Floats] = []
     for one in sorted(found, key=lambda one: float(one.fun)):
         if all(np.any(np.abs(one.x - other) > apart) for other in best):

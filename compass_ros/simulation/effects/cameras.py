@@ -16,15 +16,15 @@ SEEN = SignalSize("camera", "m", 1.0, (0.0, 0.0, 0.0), 1.0)
 """A camera that sees a metre to each side of the origin: for names and units."""
 _ASIDE = 3.0
 """How far beside the middle of what was seen the axis may be, in its reach: what is thrown crosses a part of it."""
-_TILTED = 1.1 * np.pi / 2
-"""Largest tilt about x or y [rad]; a quarter turn is enough, and a search should not begin at a bound."""
-_NODES = 3
-"""Of a grid for a shape: a cubic of the place changes little between them."""
+_TILTED = 1.04 * np.pi / 2
+"""Largest tilt about x or y [rad]; a quarter turn is enough, and a fit should not lie on a bound."""
+_PLACES, _TILTS = 5, 3
+"""Of grids: a reach and a half apart; along each axis of the scene, to both sides, and between them."""
 
 
 def centre(size: SignalSize, axes: str, searched: bool = False) -> tuple[Quantity, ...]:
     """Shapes of where the axis meets what is seen, of some of the scene's axes that are seen."""
-    far, grid = _ASIDE * size.reach, _NODES if searched else 0
+    far, grid = _ASIDE * size.reach, _PLACES if searched else 0
     return tuple(
         Quantity(f"centre_{axis}", "m", middle - far, middle + far, size.reach, False, middle, later=True, grid=grid)
         for axis, middle in zip("xyz", size.middle, strict=False)
@@ -35,7 +35,7 @@ def centre(size: SignalSize, axes: str, searched: bool = False) -> tuple[Quantit
 def tilt() -> tuple[Quantity, ...]:
     """Shapes of the direction of the axis."""
     return tuple(
-        Quantity(f"tilt_{axis}", "rad", -_TILTED, _TILTED, 0.3, amplitude=False, later=True, grid=_NODES)
+        Quantity(f"tilt_{axis}", "rad", -_TILTED, _TILTED, 0.3, amplitude=False, later=True, grid=_TILTS)
         for axis in "xy"
     )
 
