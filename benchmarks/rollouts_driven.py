@@ -5,7 +5,8 @@
 The contestants run in turn, several rounds; the best round of each counts. `mujoco.rollout`: one model, the controls
 made beforehand, nothing done with the states. Ours: parameters written into a model each, recorded targets made into
 controls (late by the delay of each rollout), the signals observed at the recorded stamps. A Jacobian: one parameter is
-another in each rollout, as in a fit; any values: all are, so that no two rollouts share a delay.
+another in each rollout, as in a fit; any values: all are, so that no two rollouts share a delay. Laws: the same with
+three of them on each joint.
 """
 
 from __future__ import annotations
@@ -22,8 +23,13 @@ from mujoco.rollout import Rollout
 from compass_ros.bench.driven import Routine, record
 from compass_ros.cells import load
 from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.simulation.replay import recordings
+from compass_ros.simulation.visited import Visited
 from compass_ros.simulation.windows import windows
+
+LAWS = "stribeck_friction", "cogging", "quadratic_drag"
+"""On each joint, of a friction that holds, a force by place and one by speed."""
 
 
 def runs(cell_name: str, rollouts: int, threads: int) -> dict[str, Callable[[], object]]:
@@ -48,8 +54,14 @@ def runs(cell_name: str, rollouts: int, threads: int) -> dict[str, Callable[[], 
         parts = physics.drives.parts
         return pool.rollout(physics.model, data_of, start, controls, control_spec=parts, nstep=steps)
 
+    sizes = Visited(simulator, cell.defaults, inputs, time_s).joint_sizes()
+    laws = [Attached(EFFECTS[name].at(sizes[joint]), (joint,)) for joint in simulator.moving for name in LAWS]
+    lawful = simulator.with_effects(laws)
+    numbers = [q.scale if q.amplitude else q.start for law in laws for q in law.effect.quantities]
+    with_laws = np.concatenate([rows, np.tile(numbers, (rollouts, 1))], axis=1)
     return {
         "mujoco.rollout": bare,
+        "Simulator, a Jacobian, laws": lambda: lawful.observe(with_laws, inputs, time_s),
         "Simulator, a Jacobian": lambda: simulator.observe(rows, inputs, time_s),
         "Simulator, any values": lambda: simulator.observe(draws, inputs, time_s),
     }

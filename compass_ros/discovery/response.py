@@ -111,9 +111,10 @@ class Response:
 
         Of a force that changes between two moments: pushes are linear in time between them, as `readings`.
         """
-        moments, frame = self.kicks.moments_s, float(np.nanmedian(np.diff(self.likelihood.time_s, axis=1)))
+        moments, gaps = self.kicks.moments_s, np.diff(self.likelihood.time_s, axis=1)
         if len(moments) < 2:
             return self.states, np.ones((1, 1))
+        frame = float(np.median(gaps[gaps > 0]))  # a window that ends before the others repeats its last one
         apart = float(np.diff(moments).mean())
         each = max(round(apart / frame), 1)
         time = np.ravel(moments[:, None] + apart * ((np.arange(each) + 0.5) / each - 0.5))
