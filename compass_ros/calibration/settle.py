@@ -1,4 +1,4 @@
-"""The end of a fit: the last steps to its optimum, and differences that know it for one."""
+"""The end of a fit: the last steps to its optimum."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from compass_ros.calibration.least_squares import (
     difference_steps,
     move_between,
     normal_equations,
-    robust_weight,
 )
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.valleys import along_valleys
@@ -65,7 +64,7 @@ def settled(likelihood: Likelihood, fit: Fit, rounds: int = 2) -> Fit:
         unexplained = point.cost - 0.5 * likelihood.measurements
         if taken >= rounds - 1 and before - point.cost < max(SETTLED, WORTHWHILE * unexplained):
             break
-    return stationary(likelihood, replace(fit, point=point, linear=linear))
+    return replace(fit, point=point, linear=linear)
 
 
 def _best_step(likelihood: Likelihood, point: Point, linear: Linear, free: Ints, robust: float) -> tuple[Point, Floats]:
@@ -75,25 +74,3 @@ def _best_step(likelihood: Likelihood, point: Point, linear: Linear, free: Ints,
     costs, residuals = cost(likelihood, trials, robust)
     best = int(np.argmin(costs))
     return replace(trials[best], cost=float(costs[best])), residuals[best]
-
-
-def stationary(likelihood: Likelihood, fit: Fit) -> Fit:
-    """The same with the least change of its differences by which the optimum is one.
-
-    No step lowered the cost, so its derivative there is zero, but for values that a bound holds back. Differences that
-    are wrong by a per cent have another one where the effects of coupled parameters cancel, and to first order promise
-    a fit that is better by hundreds of log likelihood. Each column loses its gradient along the weighted residual.
-    """
-    linear, point = fit.linear, fit.point
-    _, gradient = normal_equations(likelihood, point, linear, fit.free, fit.robust)
-    p, values = len(fit.free), point.values[fit.free]
-    of_all, own = gradient[:p], gradient[p:].reshape(len(linear.residual), -1)
-    outward = ((values <= likelihood.low[fit.free]) & (of_all > 0)) | (
-        (values >= likelihood.high[fit.free]) & (of_all < 0)
-    )
-    squares = np.sum(robust_weight(linear.residual, fit.robust) * linear.residual**2, axis=(1, 2))  # (E,)
-    of_all = np.where(outward, 0.0, of_all) / max(float(squares.sum()), 1e-300)
-    own = own / np.maximum(squares, 1e-300)[:, None]
-    jacobian = linear.jacobian - linear.residual[..., None] * of_all
-    launch = linear.launch_jacobian - linear.residual[..., None] * own[:, None, None, :]
-    return replace(fit, linear=replace(linear, jacobian=jacobian, launch_jacobian=launch))

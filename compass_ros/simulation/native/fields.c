@@ -101,10 +101,10 @@ void compass_forget(const mjModel* model) {
 
 // What a force may depend on: position [m] and velocity [m/s] in the world (JOINT: angle and rate in [0]), inertia.
 // Numbers of a joint are forces and torques themselves: its mass is 1 and it has no weight. `load`: what drives a joint.
-// `stop`: the force against which it would be at rest after the step; 0 where it is not known. Of a body in space also its
-// spin and gravity, in the world.
+// `way`: into which direction a joint would move if its friction did not hold it, 1 or -1; 0: as its velocity has it. Of a
+// body in space also its spin and gravity, in the world.
 typedef struct {
-  double x, y, vx, vy, vz, speed, mass, weight, time, stop, load;
+  double x, y, vx, vy, vz, speed, mass, weight, time, way, load;
   double spin[3], gravity[3];
 } State;
 
@@ -112,10 +112,9 @@ typedef struct {
   double x, y, z;
 } Force;
 
-// Against the velocity, smooth through zero over the creep speed. A joint it stops within a step, and then holds against
-// all that loads it, up to its magnitude.
+// Against the velocity, smooth through zero over the creep speed; of a joint at most, against the way it would move.
 static Force along(const State* s, double magnitude, double creep) {
-  if (s->stop && magnitude > 0) return (Force){-fmax(-magnitude, fmin(magnitude, s->stop)), 0, 0};
+  if (s->way) return (Force){-magnitude * s->way, 0, 0};
   double rate = sqrt(s->speed * s->speed + creep * creep), k = rate > 0 ? -magnitude / rate : 0;
   return (Force){k * s->vx, k * s->vy, k * s->vz};
 }
@@ -211,7 +210,7 @@ static Force evaluate(const Term* term, const State* s) {
       return (Force){-s->mass * p[0] * (p[2] > 0 ? sin(turn) / p[2] : p[2] < 0 ? sinh(turn) / p[2] : away), 0, 0};
     }
     case ASYMMETRIC:       // p: extra friction forwards
-      return (s->stop ? s->stop : s->vx) > 0 ? along(s, p[0], 0) : (Force){0, 0, 0};
+      return (s->way ? s->way : s->vx) > 0 ? along(s, p[0], 0) : (Force){0, 0, 0};
     case LOAD_FRICTION:    // p: friction as a share of the load
       return along(s, p[0] * fabs(s->load), 0);
     case COGGING:          // p: cosine and sine amplitude, periods per turn
@@ -273,48 +272,48 @@ static int dry(const Term* term) {
   }
 }
 
-static void push(const mjModel* m, mjData* d, const Term* term, double stop) {
-  State s = {.time = d->time};
-  const double* v = d->qvel + term->dof;
-  const double* com = d->xipos + (term->object == JOINT ? 0 : 3 * term->id);
-  double arm[2] = {0, 0};   // from the body's origin to its centre of mass
+static State joint_state(const mjModel* m, const mjData* d, const Term* term) {
+  double v = d->qvel[term->dof];
+  return (State){.x = d->qpos[m->jnt_qposadr[term->id]], .vx = v, .speed = fabs(v), .mass = 1, .time = d->time,
+                 .load = d->qfrc_actuator[term->dof] + d->qfrc_applied[term->dof]};
+}
+
+static void push(const mjModel* m, mjData* d, const Term* term) {
+  double* passive = d->qfrc_passive + term->dof;
   if (term->object == JOINT) {
-    s.x = d->qpos[m->jnt_qposadr[term->id]];
-    s.vx = v[0];
-    s.mass = 1;
-    s.stop = stop;
-    if (term->kind == LOAD_FRICTION) s.load = d->qfrc_actuator[term->dof] + d->qfrc_applied[term->dof];
+    State s = joint_state(m, d, term);
+    passive[0] += evaluate(term, &s).x;
+    return;
+  }
+  const double* v = d->qvel + term->dof;
+  const double* com = d->xipos + 3 * term->id;
+  double arm[2] = {0, 0};   // from the body's origin to its centre of mass
+  State s = {.x = com[0], .y = com[1], .mass = m->body_mass[term->id], .time = d->time};
+  s.weight = -s.mass * m->opt.gravity[2];
+  if (term->object == BODY) {
+    double velocity[3];
+    body_velocity(m, d, term->id, com, velocity);
+    s.vx = velocity[0];
+    s.vy = velocity[1];
+    s.vz = velocity[2];
+    memcpy(s.spin, d->cvel + 6 * term->id, sizeof s.spin);
+    memcpy(s.gravity, m->opt.gravity, sizeof s.gravity);
   } else {
-    s.x = com[0];
-    s.y = com[1];
-    s.mass = m->body_mass[term->id];
-    s.weight = -s.mass * m->opt.gravity[2];
-    if (term->object == BODY) {
-      double velocity[3];
-      body_velocity(m, d, term->id, com, velocity);
-      s.vx = velocity[0];
-      s.vy = velocity[1];
-      s.vz = velocity[2];
-      memcpy(s.spin, d->cvel + 6 * term->id, sizeof s.spin);
-      memcpy(s.gravity, m->opt.gravity, sizeof s.gravity);
-    } else {
-      double rate = term->object == PLANAR_YAW ? v[2] : 0;
-      for (int k = 0; k < 2; k++) arm[k] = com[k] - d->xpos[3 * term->id + k];
-      s.vx = v[0] - rate * arm[1];
-      s.vy = v[1] + rate * arm[0];
-    }
+    double rate = term->object == PLANAR_YAW ? v[2] : 0;
+    for (int k = 0; k < 2; k++) arm[k] = com[k] - d->xpos[3 * term->id + k];
+    s.vx = v[0] - rate * arm[1];
+    s.vy = v[1] + rate * arm[0];
   }
   s.speed = sqrt(s.vx * s.vx + s.vy * s.vy + s.vz * s.vz);
   Force f = evaluate(term, &s);
-  double* passive = d->qfrc_passive + term->dof;
   if (term->object == BODY) {
     mjtNum force[3] = {f.x, f.y, f.z}, torque[3] = {0, 0, 0};
     apply_ft(m, d, force, torque, com, term->id, d->qfrc_passive);
-  } else {
-    passive[0] += f.x;
-    if (term->object != JOINT) passive[1] += f.y;
-    if (term->object == PLANAR_YAW) passive[2] += arm[0] * f.y - arm[1] * f.x;
+    return;
   }
+  passive[0] += f.x;
+  passive[1] += f.y;
+  if (term->object == PLANAR_YAW) passive[2] += arm[0] * f.y - arm[1] * f.x;
 }
 
 // --- contacts -----------------------------------------------------------------------------------------------------------
@@ -379,26 +378,83 @@ static void tangential_impulse(const mjModel* m, mjData* d, const Term* term) {
 
 // --- what MuJoCo calls --------------------------------------------------------------------------------------------------
 
-// Frictions that hold joints, one after the other, each against what the others leave: a sweep of Gauss and Seidel. They
-// come after all other forces, for a joint is held against these.
+// Solves a (n, n) symmetric positive definite system in place by Cholesky's factors; `x` holds the right side, then the
+// solution.
+static void solve_small(int n, double* a, double* x) {
+  for (int i = 0; i < n; i++) {
+    for (int j = 0; j <= i; j++) {
+      double sum = a[i * n + j];
+      for (int k = 0; k < j; k++) sum -= a[i * n + k] * a[j * n + k];
+      a[i * n + j] = i == j ? sqrt(sum) : sum / a[j * n + j];
+    }
+    for (int k = 0; k < i; k++) x[i] -= a[i * n + k] * x[k];
+    x[i] /= a[i * n + i];
+  }
+  for (int i = n - 1; i >= 0; i--) {
+    for (int k = i + 1; k < n; k++) x[i] -= a[k * n + i] * x[k];
+    x[i] /= a[i * n + i];
+  }
+}
+
+// Dry frictions of joints: the forces between their two limits with which these are at rest after the step. They come
+// after all other forces, for a joint is held against these. Those that each joint alone would not be held by are at a
+// limit at first; held ones beyond a limit go there, and are held again where they would be pushed back (block pivoting,
+// Judice and Pires 1994, which ends after two or three rounds).
 static void hold(const mjModel* m, mjData* d, const Program* program) {
-  double load[m->nv], acceleration[m->nv], unit[m->nv], column[m->nv];
+  int nv = m->nv, n = 0, dofs[nv], held[nv], solved[nv];
+  double load[nv], total[nv], after[nv], unit[nv], low[nv], high[nv], force[nv], limit[nv], right[nv];
+  double column[nv * nv], matrix[nv * nv];
   fwd_actuation(m, d);   // MuJoCo computes these two after the passive forces
   rne(m, d, 0, d->qfrc_bias);
-  for (int k = 0; k < m->nv; k++)
-    load[k] = d->qfrc_passive[k] + d->qfrc_actuator[k] + d->qfrc_applied[k] - d->qfrc_bias[k], unit[k] = 0;
-  solve_m(m, d, acceleration, load, 1);
-  for (int64_t i = 0; i < program->n; i++) {
-    const Term* term = program->term + i;
-    if (!dry(term)) continue;
-    int dof = term->dof;
-    unit[dof] = 1;
-    solve_m(m, d, column, unit, 1);
-    unit[dof] = 0;
-    double before = d->qfrc_passive[dof];
-    push(m, d, term, (d->qvel[dof] / m->opt.timestep + acceleration[dof]) / column[dof]);
-    for (int k = 0; k < m->nv; k++) acceleration[k] += column[k] * (d->qfrc_passive[dof] - before);
+  for (int k = 0; k < nv; k++) {
+    load[k] = d->qfrc_passive[k] + d->qfrc_actuator[k] + d->qfrc_applied[k] - d->qfrc_bias[k];
+    unit[k] = solved[k] = 0;
   }
+  for (int64_t t = 0; t < program->n; t++) {
+    const Term* term = program->term + t;
+    if (!dry(term)) continue;
+    int i = 0;
+    while (i < n && dofs[i] != term->dof) i++;
+    if (i == n) dofs[n++] = term->dof, low[i] = high[i] = 0;
+    State s = joint_state(m, d, term);
+    s.way = 1, low[i] += evaluate(term, &s).x;
+    s.way = -1, high[i] += evaluate(term, &s).x;
+  }
+  for (int i = 0; i < n; i++) {
+    double v = d->qvel[dofs[i]], stop = -d->qM[m->dof_Madr[dofs[i]]] * v / m->opt.timestep - load[dofs[i]];
+    if (low[i] > high[i]) low[i] = high[i] = v > 0 ? low[i] : v < 0 ? high[i] : 0;   // less than none: along the motion
+    limit[i] = stop < low[i] ? low[i] : stop > high[i] ? high[i] : NAN;   // not a number: held
+  }
+  for (int round = 0, changed = 1; changed && round < 3 * n + 3; round++) {
+    int h = 0;
+    memcpy(total, load, sizeof total);
+    for (int i = 0; i < n; i++)
+      if (isnan(limit[i])) held[h++] = i;
+      else total[dofs[i]] += force[i] = limit[i];
+    solve_m(m, d, after, total, 1);
+    for (int r = 0; r < h; r++) {
+      int i = held[r], dof = dofs[i];
+      if (!solved[i]) unit[dof] = 1, solve_m(m, d, column + i * nv, unit, 1), unit[dof] = 0, solved[i] = 1;
+      right[r] = -d->qvel[dof] / m->opt.timestep - after[dof];
+    }
+    for (int r = 0; r < h; r++)
+      for (int c = 0; c < h; c++) matrix[r * h + c] = column[held[c] * nv + dofs[held[r]]];
+    solve_small(h, matrix, right);
+    changed = 0;
+    for (int r = 0; r < h; r++) {
+      int i = held[r];
+      force[i] = right[r];
+      for (int k = 0; k < nv; k++) after[k] += column[i * nv + k] * force[i];
+      if (force[i] < low[i] || force[i] > high[i]) limit[i] = force[i] < low[i] ? low[i] : high[i], changed = 1;
+    }
+    if (changed) continue;
+    for (int i = 0; i < n; i++) {
+      double moving = d->qvel[dofs[i]] / m->opt.timestep + after[dofs[i]];
+      if (isnan(limit[i]) || low[i] == high[i]) continue;
+      if (limit[i] == low[i] ? moving < 0 : moving > 0) limit[i] = NAN, changed = 1;
+    }
+  }
+  for (int i = 0; i < n; i++) d->qfrc_passive[dofs[i]] += fmax(low[i], fmin(high[i], force[i]));
 }
 
 void compass_passive(const mjModel* m, mjData* d) {
@@ -414,7 +470,7 @@ void compass_passive(const mjModel* m, mjData* d) {
       case ROLLING: rolling_resistance(m, d, term); break;
       case PAIR_ATTRACTION: case TETHER: between(m, d, term); break;
       case SERVO_DEAD_BAND: servo_dead_band(m, d, term); break;
-      default: if (dry(term)) holding = 1; else push(m, d, term, 0);
+      default: if (dry(term)) holding = 1; else push(m, d, term);
     }
   }
   if (holding) hold(m, d, program);

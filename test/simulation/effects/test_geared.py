@@ -63,6 +63,56 @@ def test_one_sided_friction_holds_what_it_has_stopped() -> None:
     assert abs(rate) < 1e-6
 
 
+FRICTIONS = [
+    ("coulomb_friction", (0.2,)),
+    ("stribeck_friction", (0.2, 0.5)),
+    ("asymmetric_friction", (0.2,)),
+    ("load_dependent_friction", (1.5,)),
+]
+
+
+@pytest.mark.parametrize("step", [1e-3, 5e-3])
+@pytest.mark.parametrize("share", [0.1, 0.9])
+@pytest.mark.parametrize(("law", "numbers"), FRICTIONS)
+def test_friction_holds_a_joint_against_a_load_below_it(
+    law: str, numbers: tuple[float, ...], share: float, step: float
+) -> None:
+    """A motor that pulls for ten seconds: the joint does not creep."""
+    model = axis('<motor name="m" joint="axis"/>', step=step)
+    position, rate = moved(model, laws((law, numbers, "axis")), (0.3, 0.0), 10.0, told=0.2 * share)
+    assert abs(position - 0.3) < 1e-9
+    assert abs(rate) < 1e-9
+
+
+@pytest.mark.parametrize(("law", "numbers"), FRICTIONS[:3])
+def test_friction_lets_go_above_it(law: str, numbers: tuple[float, ...]) -> None:
+    model = axis('<motor name="m" joint="axis"/>', step=1e-3)
+    position, _ = moved(model, laws((law, numbers, "axis")), (0.3, 0.0), 1.0, told=0.21)
+    assert position - 0.3 > 0.5 * 0.009 / INERTIA * 1.0**2
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.1])
+def test_coupled_joints_are_held_together(speed: float) -> None:
+    """Three links under gravity, each held by friction above its weight's torque: they come to rest and stay there."""
+    chain = "".join(
+        f'<body pos="{0.3 * (i > 0)} 0 0"><joint name="j{i}" axis="0 1 0"/>'
+        '<inertial pos="0.15 0 0" mass="0.5" diaginertia=".004 .004 .004"/>'
+        for i in range(3)
+    )
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="0.002"/><worldbody>{chain}{"</body>" * 3}</worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    data.qvel[:] = speed
+    given = laws(*(("coulomb_friction", (most,), f"j{i}") for i, most in enumerate((8.0, 4.0, 1.2))))
+    with attach(model, data, given):
+        mujoco.mj_step(model, data, nstep=100)
+        rest = data.qpos.copy()
+        mujoco.mj_step(model, data, nstep=2000)
+    assert np.abs(rest).max() < 0.01
+    assert np.abs(data.qpos - rest).max() < 1e-6
+
+
 @pytest.mark.parametrize("torque", [0.5, -0.3])
 @pytest.mark.parametrize("coefficient", [0.0, 0.1, 0.5])
 @pytest.mark.parametrize("applied", [False, True])
