@@ -62,7 +62,9 @@ def on_signals(effect: Effect, simulator: Simulator, visited: Visited) -> Iterat
         yield Attached(effect.at(visited.camera_size()) if of_camera else effect, ())
     sensors = list(_sensors(effect, simulator.cell, places))
     for sites in sensors if effect.by_name or len(sensors) > 1 else ():
-        yield Attached(effect.at(visited.signal_size(sites[0])), tuple(site.name for site in sites))
+        sized = effect.at(visited.signal_size(sites[0]))
+        if all(q.high > q.low for q in sized.quantities):  # what never moves cannot show it
+            yield Attached(sized, tuple(site.name for site in sites))
 
 
 def _sensors(effect: Effect, cell: Cell, places: Places) -> Iterator[list[Site]]:
