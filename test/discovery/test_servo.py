@@ -46,7 +46,7 @@ def test_a_law_on_a_servo_is_named_with_its_size(tmp_path: Path, law: str, numbe
     assert mismatch.verdict == "named", mismatch.sentence
     assert [e.name for e in mismatch.effects] == [law]
     for planted, (name, found) in zip(numbers, mismatch.effects[0].parameters.items(), strict=True):
-        if name == "lever":
+        if name == "softening":
             continue  # a short way says nothing of it
         unit = force if found.unit.startswith("N") else 1.0
         assert found.value / unit == pytest.approx(planted, rel=0.05), name
