@@ -84,11 +84,11 @@ def main() -> None:
             best[name] = np.minimum(best.get(name, [np.inf, np.inf]), spent).tolist()
     threads = given.threads or len(os.sched_getaffinity(0))
     print(f"{given.cell}: {given.rollouts} rollouts of a window, {threads} threads, best of {given.rounds}")
-    print(f"{'':24}{'rollouts/s':>12}{'share':>8}{'ms of one core':>16}{'share':>8}")
+    print(f"{'':28}{'rollouts/s':>12}{'share':>8}{'ms of one core':>16}{'share':>8}")
     wall0, cpu0 = best["mujoco.rollout"]
     for name, (wall, cpu) in best.items():
         rate, one = given.rollouts / wall, 1e3 * cpu / given.rollouts
-        print(f"{name:24}{rate:12.0f}{wall0 / wall:8.2f}{one:16.2f}{cpu0 / cpu:8.2f}")
+        print(f"{name:28}{rate:12.0f}{wall0 / wall:8.2f}{one:16.2f}{cpu0 / cpu:8.2f}")
 
 
 if __name__ == "__main__":

@@ -23,17 +23,18 @@ from compass_ros.calibration.valleys import along_valleys
 from compass_ros.types import Floats, Ints
 
 SETTLING = 6
-"""How often differences are taken at the end, at most."""
+"""How often differences are taken at the end, at most: a budget."""
 SERVE = 8
-"""Steps that they serve, at most."""
+"""Steps that they serve, at most: a budget."""
 FINE = (0.1, 0.03)
 """Lengths of these differences, in turn, as shares of those that move the residual by one sigma. The short ones are
 exact; the long ones see past what the simulator's steps at contacts do to a short one."""
 SETTLED = 0.3
-"""Fall of the cost [log likelihood] by a step, or by all steps with the same differences, that is the last one."""
+"""Fall of the cost [log likelihood] by a step, or by all steps with the same differences, that is the last one: models
+are compared by whole units."""
 WORTHWHILE = 0.05
 """Share of what is left above the noise that all steps with the same differences must gain: where something else
-differs, exact values are of no use."""
+differs, exact values are of no use. A budget."""
 _DAMPING = (1e-9, 1e-3, 1e-2, 1e-1, 1.0, 1e1)
 """Damping factors that are tried at once at the end."""
 

@@ -24,6 +24,12 @@ ERROR_BARS = 2.0
 """Error bars from zero within which a law is not named: a 95 % interval that holds its absence."""
 
 
+def name_of(laws: Sequence[Attached]) -> str:
+    """A model by its laws and their sites."""
+    said = (f"{a.effect.name}({', '.join(a.objects)})" if a.objects else a.effect.name for a in laws)
+    return " + ".join(sorted(said)) or "none"
+
+
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """A set of laws on sites, with its fit."""
@@ -37,8 +43,7 @@ class Hypothesis:
 
     @property
     def name(self) -> str:
-        said = (f"{a.effect.name}({', '.join(a.objects)})" if a.objects else a.effect.name for a in self.laws)
-        return " + ".join(sorted(said)) or "none"
+        return name_of(self.laws)
 
     @property
     def chi_square(self) -> float:

@@ -11,7 +11,7 @@ from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.discrepancy import to_first_order
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.fits import Begun, from_parent, race, telling, whole, without
-from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.hypothesis import Hypothesis, name_of
 from compass_ros.discovery.odds import Known, Prior
 from compass_ros.discovery.scatter import ranked_scatter, with_scatter
 from compass_ros.simulation.effects import Attached
@@ -62,28 +62,26 @@ def widen(known: Known, best: Hypothesis, ranked: Sequence[Ranked], called: bool
     known.take(whole(best, one) for one in probable(begun, known.prior))
 
 
-def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str]) -> None:
+def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str], called: bool) -> None:
     """Fit models with another law in the place of one of the best model's, until none is better.
 
     The first law that was taken stood for all that differs; beside the second one another may stand for the rest.
-    `widened`: names of models whose neighbours were fitted; those of this search are added.
+    `widened`: names of models whose neighbours were fitted; those of this search are added. `called`: as in `widen`.
     """
     leader = None
     while known.ordered and known.ordered[0][0] is not leader:
         leader, odds = known.ordered[0]
         for name in dict.fromkeys(a.effect.name for a in leader.laws):
             own = [a for a in leader.laws if a.effect.name == name]
-            if len(own) == len(leader.laws):
+            rest = name_of([a for a in leader.laws if a not in own])
+            if rest in widened:
                 continue
-            less = without(leader, own)
-            if less.name not in widened:
-                widened.add(less.name)
-                known.take([less])
-                ranked = rank(FirstOrder(less.response), candidates)
-                least = odds - known.models[less.name][1]
-                widen(
-                    known, less, [r for r in ranked if r.gain + known.prior.of_laws([r.candidate.name]) > least], False
-                )
+            widened.add(rest)
+            known.take([without(leader, own)])
+            less, of_less = known.models[rest]
+            ranked = rank(FirstOrder(less.response), candidates)
+            better = [r for r in ranked if of_less + r.gain + known.prior.of_laws([r.candidate.name]) > odds]
+            widen(known, less, better, called)
 
 
 def beside(model: Hypothesis, ranked: Sequence[Ranked], prior: Prior) -> list[float]:

@@ -11,6 +11,7 @@ import numpy as np
 from compass_ros.calibration.least_squares import Fit, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.evidence import Tangent
+from compass_ros.discovery.objections import frame_rate
 from compass_ros.discovery.settings import MOMENTS
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
@@ -111,12 +112,11 @@ class Response:
 
         Of a force that changes between two moments: pushes are linear in time between them, as `readings`.
         """
-        moments, gaps = self.kicks.moments_s, np.diff(self.likelihood.time_s, axis=1)
+        moments = self.kicks.moments_s
         if len(moments) < 2:
             return self.states, np.ones((1, 1))
-        frame = float(np.median(gaps[gaps > 0]))  # a window that ends before the others repeats its last one
         apart = float(np.diff(moments).mean())
-        each = max(round(apart / frame), 1)
+        each = max(round(apart * frame_rate(self.likelihood.time_s)), 1)
         time = np.ravel(moments[:, None] + apart * ((np.arange(each) + 0.5) / each - 0.5))
         return self._states_at(np.maximum(time, 0.0)), _hats(time, moments).T / each
 

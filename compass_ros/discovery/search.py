@@ -62,7 +62,7 @@ def search(
     best, top, ranked, widened = plain, 0.0, list(first), {plain.name}
     while ranked:
         widen(known, best, ranked, found.unknown > 0)
-        exchange(known, candidates, widened)
+        exchange(known, candidates, widened, found.unknown > 0)
         if not known.models:
             break  # nothing gains to first order, and no beginning calls for anything
         (leader, odds), *_ = known.ordered

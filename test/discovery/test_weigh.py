@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,20 +12,22 @@ import pytest
 from compass_ros.calibration.least_squares import Fit, Point, linearise
 from compass_ros.calibration.noise import Noise
 from compass_ros.config import CalibrationConfig
+from compass_ros.discovery import discover
 from compass_ros.discovery.candidates import candidates
 from compass_ros.discovery.first_order import FirstOrder
+from compass_ros.discovery.fits import from_parent, whole
 from compass_ros.discovery.hypothesis import Hypothesis
-from compass_ros.discovery.neighbours import rank
-from compass_ros.discovery.odds import Prior
-from compass_ros.discovery.search import search
+from compass_ros.discovery.neighbours import exchange, rank
+from compass_ros.discovery.odds import Known, Prior
+from compass_ros.discovery.search import Found, search
 from compass_ros.discovery.threshold import BEYOND, largest_odds, simulated
 from compass_ros.pipeline import calibrate
 from compass_ros.simulation import Simulator
-from compass_ros.simulation.effects import Attached, Effect, Quantity
+from compass_ros.simulation.effects import Attached, Effect, Quantity, effect
 from compass_ros.simulation.effects.effect import Context
 from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.types import Floats
-from test.discovery.servo import recorded, servo
+from test.discovery.servo import on_axis, recorded, servo
 from test.simulation import robots
 
 
@@ -120,3 +124,32 @@ def test_recordings_of_an_encoder_are_simulated_in_whole_steps(tmp_path: Path) -
     assert np.abs(error).max() <= step
     white = simulated(model.response, Noise(np.ones(shape[2]), 0.0), np.random.default_rng(0))
     assert white.std() == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.slow
+def test_a_law_that_stood_for_another_is_exchanged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dry friction and a delay of the command are missing; a drag was taken first, and the delay beside it."""
+    cell = servo(tmp_path)
+    given: list[tuple[Any, ...]] = []
+    laws = [on_axis("coulomb_friction"), Attached(effect("actuation_delay"), ())]
+    episodes = recorded(cell, laws, [0.08, 0.03])
+
+    def kept(*asked: Any) -> Found:
+        given.append(asked)
+        return search(*asked)
+
+    monkeypatch.setattr(sys.modules[discover.__module__], "search", kept)
+    calibrate(episodes, cell, CalibrationConfig(threads=1))
+    plain, _, asked, *_ = given[0]
+
+    def grown(parent: Hypothesis, name: str) -> Hypothesis:
+        first = next(r for r in rank(FirstOrder(parent.response), asked) if r.candidate.name == name)
+        return whole(parent, from_parent(parent, first, np.arange(len(parent.likelihood.inputs)), 4))
+
+    wrong = grown(grown(plain, "quadratic_drag"), "actuation_delay")
+    known = Known(Prior.of(asked), plain.free.alone, {})
+    known.take([wrong])
+    exchange(known, asked, {plain.name}, called=True)
+    best, odds = known.ordered[0]
+    assert {a.effect.name for a in best.laws} == {"coulomb_friction", "actuation_delay"}
+    assert odds > known.models[wrong.name][1] + 10

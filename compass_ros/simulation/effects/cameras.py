@@ -15,7 +15,8 @@ from compass_ros.types import Floats
 SEEN = SignalSize("camera", "m", 1.0, (0.0, 0.0, 0.0), 1.0)
 """A camera that sees a metre to each side of the origin: for names and units."""
 _ASIDE = 3.0
-"""How far beside the middle of what was seen the axis may be, in its reach: what is thrown crosses a part of it."""
+"""How far beside the middle of what was seen the axis may be, in its reach: within the picture, where what moves fills
+a third of it. An assumption on how cameras are set up."""
 _TILTED = 1.04 * np.pi / 2
 """Largest tilt about x or y [rad]; a quarter turn is enough, and a fit should not lie on a bound."""
 _PLACES, _TILTS = 5, 3

@@ -1,8 +1,8 @@
 """Dry friction that does not depend on speed.
 
 F = -coefficient N v / |v|; on a joint F = -coefficient v / |v|, a torque (a force on a slide).
-Source: Coulomb friction, faded in at a creep speed. Where a cell tunes sliding friction already, this is the same
-thing and so never seen.
+Source: Coulomb friction; of bodies faded in at a creep speed, of a joint at rest whatever force below `coefficient`
+holds it there. Where a cell tunes sliding friction already, this is the same thing and so never seen.
 """
 
 from __future__ import annotations

@@ -221,8 +221,8 @@ def friction(kind: Kind, context: Context, before: Floats, after: Floats | None 
     """Terms of a friction on each site: numbers before and after the creep speed and the share of the weight.
 
     Of a body on a table both are the cell's. A body that the cell says nothing of lies with all its weight, and its
-    friction is faded in at 1 mm/s. Of a joint the first number is a force; fields.c fades it in over what that
-    force would stop within a step, the least that a finite step can do without a jerk.
+    friction is faded in at 1 mm/s. Of a joint the first number is a force; fields.c holds a joint with it against all
+    other forces, the frictions of all joints together.
     """
     terms = []
     for site in context.sites:

@@ -400,22 +400,23 @@ static void solve_small(int n, double* a, double* x) {
 // after all other forces, for a joint is held against these. Those that each joint alone would not be held by are at a
 // limit at first; held ones beyond a limit go there, and are held again where they would be pushed back (block pivoting,
 // Judice and Pires 1994, which ends after two or three rounds).
-static void hold(const mjModel* m, mjData* d, const Program* program) {
-  int nv = m->nv, n = 0, dofs[nv], held[nv], solved[nv];
-  double load[nv], total[nv], after[nv], unit[nv], low[nv], high[nv], force[nv], limit[nv], right[nv];
-  double column[nv * nv], matrix[nv * nv];
+// `most`: how many terms of a program are such frictions.
+static void hold(const mjModel* m, mjData* d, const Program* program, int most) {
+  int nv = m->nv, n = 0, dofs[most], held[most], solved[most];
+  double load[nv], total[nv], after[nv], unit[nv];
+  double low[most], high[most], force[most], limit[most], right[most], column[most * nv], matrix[most * most];
   fwd_actuation(m, d);   // MuJoCo computes these two after the passive forces
   rne(m, d, 0, d->qfrc_bias);
   for (int k = 0; k < nv; k++) {
     load[k] = d->qfrc_passive[k] + d->qfrc_actuator[k] + d->qfrc_applied[k] - d->qfrc_bias[k];
-    unit[k] = solved[k] = 0;
+    unit[k] = 0;
   }
   for (int64_t t = 0; t < program->n; t++) {
     const Term* term = program->term + t;
     if (!dry(term)) continue;
     int i = 0;
     while (i < n && dofs[i] != term->dof) i++;
-    if (i == n) dofs[n++] = term->dof, low[i] = high[i] = 0;
+    if (i == n) dofs[n++] = term->dof, low[i] = high[i] = solved[i] = 0;
     State s = joint_state(m, d, term);
     s.way = 1, low[i] += evaluate(term, &s).x;
     s.way = -1, high[i] += evaluate(term, &s).x;
@@ -470,8 +471,8 @@ void compass_passive(const mjModel* m, mjData* d) {
       case ROLLING: rolling_resistance(m, d, term); break;
       case PAIR_ATTRACTION: case TETHER: between(m, d, term); break;
       case SERVO_DEAD_BAND: servo_dead_band(m, d, term); break;
-      default: if (dry(term)) holding = 1; else push(m, d, term);
+      default: if (dry(term)) holding++; else push(m, d, term);
     }
   }
-  if (holding) hold(m, d, program);
+  if (holding) hold(m, d, program, holding);
 }
