@@ -17,8 +17,12 @@ FIRST_STEP = 0.02
 """First finite differences, in standard deviations of the prior."""
 MARGIN_S = 0.1
 """How much earlier than at a point nearby a parameter may begin to act [s]."""
-_TRIALS = np.array([0.01, 1.0, 100.0])
-"""Damping factors tried at once, relative to the current one."""
+_TRIALS = ((1.0,), (0.01, 100.0))
+"""Damping factors, relative to the current one: those of a group are tried at once, the second group where the first
+does not do what the linear model hopes for."""
+_AS_HOPED, _EASIER = 0.9, 0.1
+"""Share of the hoped fall of the cost from which a step is as good as any, and factor of the damping after such a one;
+where the linear model holds, damping only shortens the step."""
 
 
 @dataclass(frozen=True)
@@ -250,19 +254,13 @@ def minimise(
         if linear is None:
             linear, steps = _linearise_well(likelihood, point, free, steps, onset)
             onset, exact = linear.onset, True
-        hessian, gradient = normal_equations(likelihood, point, linear, free, robust)
-        trials = [damped_step(likelihood, point, free, hessian, gradient, damping * factor) for factor in _TRIALS]
-        costs, residuals = cost(likelihood, trials, robust)
-        best = int(np.argmin(costs))
-        gained = point.cost - float(costs[best])
+        step = _best_step(likelihood, point, linear, free, robust, damping)
+        gained = point.cost - step.point.cost
         if gained > 0:
-            move = move_between(likelihood, point, trials[best], free)
-            hoped = -float(gradient @ move + 0.5 * move @ hessian @ move)
-            damping = max(damping * _TRIALS[best], 1e-9)
-            point = replace(trials[best], cost=float(costs[best]))
+            damping, point = step.damping, step.point
             converged = exact and gained < tolerance
-            keep = converged or (gained > 0.5 * hoped and gained > tolerance)
-            linear = broyden(linear, residuals[best], move) if keep else None
+            keep = converged or (gained > 0.5 * step.hoped and gained > tolerance)
+            linear = broyden(linear, step.residual, step.move) if keep else None
             exact = False
         elif exact:
             damping *= 1e3
@@ -272,6 +270,39 @@ def minimise(
     if linear is None or (fresh and not exact):
         linear, _ = _linearise_well(likelihood, point, free, steps, onset)
     return Fit(point, linear, free, robust, iteration, converged)
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A damped step that was tried."""
+
+    point: Point
+    residual: Floats
+    """(E, F, C) there."""
+    move: Floats
+    """(n,) standard deviations of the prior."""
+    hoped: float
+    """Fall of the cost by the linear model."""
+    damping: float
+    """To begin the next step with."""
+
+
+def _best_step(
+    likelihood: Likelihood, point: Point, linear: Linear, free: Ints, robust: float, damping: float
+) -> _Step:
+    """The step with this damping where it does what the linear model hopes for; else the best with others too."""
+    hessian, gradient = normal_equations(likelihood, point, linear, free, robust)
+    found: list[_Step] = []
+    for factors in _TRIALS:
+        dampings = [damping * factor for factor in factors]
+        trials = [damped_step(likelihood, point, free, hessian, gradient, d) for d in dampings]
+        for trial, c, residual, d in zip(trials, *cost(likelihood, trials, robust), dampings, strict=True):
+            move = move_between(likelihood, point, trial, free)
+            hoped = -float(gradient @ move + 0.5 * move @ hessian @ move)
+            found.append(_Step(replace(trial, cost=float(c)), residual, move, hoped, max(d, 1e-9)))
+        if len(found) == 1 and point.cost - found[0].point.cost > _AS_HOPED * found[0].hoped:
+            return replace(found[0], damping=max(_EASIER * damping, 1e-9))
+    return min(found, key=lambda step: step.point.cost)
 
 
 def _linearise_well(

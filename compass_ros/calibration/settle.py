@@ -50,7 +50,7 @@ def settled(likelihood: Likelihood, fit: Fit, rounds: int = 2) -> Fit:
     point = replace(fit.point, cost=float(cost(likelihood, [fit.point], robust)[0][0]))
     for taken in range(SETTLING):
         steps = FINE[taken % len(FINE)] * difference_steps(linear)
-        linear = central(likelihood, point, free, steps, linear.onset if taken else None)
+        linear = central(likelihood, point, free, steps, linear.onset)
         linear = along_valleys(likelihood, point, linear, free, robust)
         before = point.cost
         for _ in range(SERVE):
@@ -58,10 +58,12 @@ def settled(likelihood: Likelihood, fit: Fit, rounds: int = 2) -> Fit:
             step = point.cost - best.cost
             if step <= 0:
                 break
-            linear = broyden(linear, residual, move_between(likelihood, point, best, free))
+            move = move_between(likelihood, point, best, free)
             point = best
-            if step < SETTLED:
+            if step < SETTLED:  # over a step as short as this differences show the simulator's roughness
+                linear = replace(linear, residual=residual)
                 break
+            linear = broyden(linear, residual, move)
         unexplained = point.cost - 0.5 * likelihood.measurements
         if taken >= rounds - 1 and before - point.cost < max(SETTLED, WORTHWHILE * unexplained):
             break

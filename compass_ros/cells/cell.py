@@ -11,7 +11,7 @@ import numpy as np
 
 from compass_ros.cells.signals import Signal, of_object, of_spec
 from compass_ros.cells.spec import CellSpec, FactorSpec, ObjectSpec
-from compass_ros.cells.start import StartSpec, first_state, form_error, input_names, input_std
+from compass_ros.cells.start import StartSpec, first_state, input_names, input_std, stated_error
 from compass_ros.errors import ConfigError, nearest
 from compass_ros.types import ActionField, Bools, Episode, Floats, Parameter
 
@@ -139,7 +139,7 @@ class Cell:
         """
         std: list[float] = [self.spec.launch_noise.get(a.name, 0.0) for a in self.action]
         for spec in self.starts:
-            std += input_std(spec, self.signal(spec.object), self.spec.windows is not None)
+            std += input_std(spec, self.signal(spec.object))
         std += [self.spec.release.noise_s] if self.spec.release else []
         return np.array(std + [0.0] * bool(self.spec.inputs))
 
@@ -148,7 +148,8 @@ class Cell:
         std, at = np.zeros(len(self.input_names)), len(self.action)
         for spec in self.starts:
             signal = self.signal(spec.object)
-            stated = episode.initial_std.get(spec.object, ()) or form_error(spec, signal, episode)
+            noise = self.spec.noise_m if signal.noise is None else signal.noise
+            stated = episode.initial_std.get(spec.object, ()) or stated_error(spec, signal, episode, noise)
             std[at : at + len(stated)] = stated
             at += len(input_names(spec, signal))
         return std

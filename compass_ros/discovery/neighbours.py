@@ -77,7 +77,10 @@ def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str], c
             if rest in widened:
                 continue
             widened.add(rest)
-            known.take([without(leader, own)])
+            if rest not in known.models:
+                known.take([without(leader, own)])
+            if rest not in known.models:
+                continue  # another of its laws is zero without this one
             less, of_less = known.models[rest]
             ranked = rank(FirstOrder(less.response), candidates)
             better = [r for r in ranked if of_less + r.gain + known.prior.of_laws([r.candidate.name]) > odds]

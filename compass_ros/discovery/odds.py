@@ -57,13 +57,17 @@ class Known:
     plain: float
     """Log evidence of the plain model."""
     models: dict[str, tuple[Hypothesis, float]]
+    finished: set[str]
+    """Names of those that were brought to their optimum; one that is not among the models has a law that is zero."""
 
     def odds(self, model: Hypothesis, log_evidence: float) -> float:
         return log_evidence - self.plain + self.prior.of_laws(a.effect.name for a in model.laws)
 
     def take(self, models: Iterable[Hypothesis]) -> None:
-        """The better of two fits of one model stays."""
+        """The better of two fits of one model stays, and one at its optimum."""
         for model in models:
+            if model.name in self.finished:
+                continue
             odds = self.odds(model, model.log_evidence)
             if model.name not in self.models or odds > self.models[model.name][1]:
                 self.models[model.name] = (model, odds)

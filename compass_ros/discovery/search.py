@@ -6,7 +6,7 @@ long as a better one is found; where what is left still calls for a discrepancy,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,11 +58,14 @@ def search(
     optimistic = max([found.unknown, *(f.gain + prior.of_laws([f.candidate.name]) for f in first)])
     if optimistic < beaten:
         return found
-    known = Known(prior, none, {})
+    known = Known(prior, none, {}, set())
     best, top, ranked, widened = plain, 0.0, list(first), {plain.name}
+    others = (0.0, found.unknown)
     while ranked:
         widen(known, best, ranked, found.unknown > 0)
+        finish(known, others)
         exchange(known, candidates, widened, found.unknown > 0)
+        finish(known, others)
         if not known.models:
             break  # nothing gains to first order, and no beginning calls for anything
         (leader, odds), *_ = known.ordered
@@ -75,7 +78,6 @@ def search(
         ranked = rank(FirstOrder(best.response), candidates)
         if top + max(r.gain + prior.of_laws([r.candidate.name]) for r in ranked) < found.unknown:
             break  # no law more could come up to a free discrepancy
-    finish(known, (0.0, found.unknown))
     models = known.ordered
     return Found(plain, found.unknown, tuple(h for h, _ in models), tuple(o for _, o in models), tuple(first))
 
@@ -84,28 +86,28 @@ def finish(known: Known, others: Sequence[float]) -> None:
     """Bring the models that hold all but SLIGHT of the probability to their optimum, in place.
 
     What a fit still lacks there, and rough differences, are worth some units of log evidence: as much as two laws may
-    be apart. One with a law that is within its error bars of zero, as the noise leaves them or as the episodes disagree
-    on it (`Hypothesis.weak`), is the model without that law, and stands for it. `others`: log odds of models without
-    a law.
+    be apart, or a discrepancy may stand for; and first order is what it says about an optimum alone. A model with a law
+    that is within its error bars of zero, as the noise leaves them or as the episodes disagree on it
+    (`Hypothesis.weak`), is the model without that law, and stands for it. `others`: log odds of models without a law.
     """
-    done: set[str] = set()
-    while (name := _unfinished(known, others, done)) is not None:
-        done.add(name)
+    while (name := _unfinished(known, others)) is not None:
         model = finished(known.models.pop(name)[0])
+        known.finished.add(name)
         if not model.weak:
             known.models[name] = model, known.odds(model, model.log_evidence)
         elif len(model.weak) < len(model.laws):
             less = without(model, model.weak)
-            known.models.setdefault(less.name, (less, known.odds(less, less.log_evidence)))
+            if less.name not in known.models:
+                known.take([less])
 
 
-def _unfinished(known: Known, others: Sequence[float], done: Collection[str]) -> str | None:
+def _unfinished(known: Known, others: Sequence[float]) -> str | None:
     """The most probable model that holds a share of the probability and is not at its optimum; None: there is none."""
     total = log_sum(np.array([*others, *(odds for _, odds in known.models.values())]))
     rest, found = -np.inf, None
     for name, (_, odds) in sorted(known.models.items(), key=lambda item: item[1][1]):
         rest = np.logaddexp(rest, odds)  # of this one and all less probable ones
-        if name not in done and rest - total > np.log(SLIGHT):
+        if name not in known.finished and rest - total > np.log(SLIGHT):
             found = name
     return found
 

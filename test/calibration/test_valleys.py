@@ -38,7 +38,7 @@ def test_roughness_between_parameters_that_cancel_is_not_information() -> None:
     spread = found.covariance[:2, :2]
     assert found.fit.point.values.sum() == pytest.approx(1.0, abs=0.01)
     assert np.sqrt(ACROSS @ spread @ ACROSS) == pytest.approx(1.0, abs=0.1)
-    assert abs(found.fit.point.values @ ACROSS) < 0.1, "the prior's mean"
+    assert abs(found.fit.point.values @ ACROSS) < 0.2, "the prior's mean, but for what the roughness makes of it"
 
 
 @pytest.mark.parametrize("own", [0.0, 0.02])

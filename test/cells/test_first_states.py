@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from compass_ros.cells import Cell
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import recordings
 from compass_ros.types import Episode, Floats, Track
-from test.cells.written import content, parameter, written
+from test.cells.written import TOSS, content, parameter, written
 
 BEGUN = 1_700_000_000_000_000_000
 FRAMES = 9
@@ -46,7 +47,7 @@ def std(of: Cell, episode: Episode) -> Floats:
 TIME = np.arange(120) / 60
 
 
-@pytest.mark.parametrize("jerk", [0.0, 10.0, 100.0, -300.0])
+@pytest.mark.parametrize("jerk", [0.0, 1.0, 10.0, 100.0, -300.0])
 def test_it_grows_with_what_a_parabola_gets_wrong(tmp_path: Path, jerk: float) -> None:
     """The true first rate lies within it, of any cubic motion."""
     motion = 0.3 - 0.2 * TIME + 2.0 * TIME**2 + jerk / 6 * TIME**3
@@ -55,8 +56,24 @@ def test_it_grows_with_what_a_parabola_gets_wrong(tmp_path: Path, jerk: float) -
     position, rate = of.inputs(episode)
     stds = std(of, episode)
     assert abs(position - 0.3) < 3 * stds[0]
-    assert abs(rate - -0.2) <= np.sqrt(stds[1] ** 2 - 0.01**2) + 1e-9
-    assert stds[1] == pytest.approx(np.hypot(0.01, abs(rate + 0.2)), rel=1e-6)
+    assert stds[1] == pytest.approx(np.hypot(0.01, 2.0 * abs(rate + 0.2)), rel=1e-6)
+
+
+@pytest.mark.parametrize("rate_hz", [0.5, 1.0, 2.0, 4.0, 8.0])
+@pytest.mark.parametrize("frames", [5, 6, 9])
+def test_of_fast_motion_it_is_as_large_as_it_says(tmp_path: Path, rate_hz: float, frames: int) -> None:
+    """Oscillations from slow ones to those that frames hardly show, each at 60 phases."""
+    rng, missed, omega = np.random.default_rng(0), [], 2 * np.pi * rate_hz
+    damping = parameter("axis@dyna@damping", "dof_damping", "axis", 0.01, 0.01)
+    start = {"object": "axis", "frames": frames}
+    of = written(tmp_path, SCENE, content([{"name": "axis", "quantity": "joint"}], [damping], start=[start]))
+    for phase in rng.uniform(0, 2 * np.pi, 60):
+        episode = recorded(0.3 * np.cos(omega * TIME + phase) + rng.normal(0, 0.001, len(TIME)))
+        true = 0.3 * np.array([np.cos(phase), -omega * np.sin(phase)])
+        missed.append((of.inputs(episode) - true) / std(of, episode))
+    of_each = np.sqrt(np.mean(np.square(missed), axis=0))
+    assert np.all(of_each > 0.2)
+    assert np.all(of_each < 1.5)
 
 
 def test_a_parabola_adds_nothing(tmp_path: Path) -> None:
@@ -76,3 +93,41 @@ def test_what_is_not_taken_from_the_track_is_as_the_cell_says(
 ) -> None:
     episode = recorded(0.3 + 20.0 * TIME**3, stated)
     assert std(cell(tmp_path, velocity, noise), episode) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("velocity", ["track", "rest"])
+def test_where_the_cell_says_nothing_it_is_as_exact_as_the_frames(tmp_path: Path, velocity: str) -> None:
+    """Of 400 recordings of one motion with noise, the first states scatter by as much as each of them says."""
+    start = {"object": "axis", "velocity": velocity, "frames": 5}
+    damping = parameter("axis@dyna@damping", "dof_damping", "axis", 0.01, 0.01)
+    made = content([{"name": "axis", "quantity": "joint"}], [damping], start=[start], noise_m=0.002)
+    of, rng = written(tmp_path, SCENE, made), np.random.default_rng(0)
+    still = 0.3 - 0.2 * TIME if velocity == "track" else np.full(len(TIME), 0.3)
+    read = np.array([of.inputs(recorded(still + rng.normal(0, 0.002, len(TIME)))) for _ in range(400)])
+    assert std(of, recorded(still)) == pytest.approx(read.std(axis=0), rel=0.12)
+    assert std(of, recorded(still, (0.3, -0.2))) == pytest.approx([0.0, 0.0])
+
+
+def test_so_is_the_first_pose_of_a_body(tmp_path: Path) -> None:
+    """The same of a cube that is thrown and turns: position, velocity, a rotation vector and the rate."""
+    start = {"object": "cube", "frames": 6}
+    mass = parameter("cube@dyna@mass", "body_mass", "cube", 0.37, 0.1)
+    of = written(tmp_path, TOSS, content([{"name": "cube", "quantity": "pose"}], [mass], start=[start], noise_m=0.002))
+    rng, time = np.random.default_rng(0), TIME[:30]
+    place = np.array([0.1, 0.2, 0.5]) + time[:, None] * np.array([1.0, -0.5, 2.0])
+    turned = Rotation.from_rotvec(time[:, None] * np.array([0.0, 0.0, 1.0])).as_quat()[:, [3, 0, 1, 2]]
+
+    def thrown(noise: float) -> Episode:
+        value = np.concatenate([place, turned], axis=1) + rng.normal(0, noise, (len(time), 7))
+        value[:, 3:] /= np.linalg.norm(value[:, 3:], axis=1, keepdims=True)
+        stamps = BEGUN + np.round(time * 1e9).astype(np.int64)
+        return Episode("e", "cell", "", {}, BEGUN, (Track("cube", "pose", stamps, value),), {})
+
+    said = dict(zip(of.input_names, std(of, thrown(0.0)), strict=True))
+    read = np.array([of.inputs(thrown(0.002)) for _ in range(400)])
+    scatter = dict(zip(of.input_names, read.std(axis=0), strict=True))
+    for name in ("x", "z", "vx", "vz", "wx", "wz"):
+        assert said[f"cube.{name}"] == pytest.approx(scatter[f"cube.{name}"], rel=0.15), name
+    half = scatter["cube.qx"]
+    assert said["cube.rx"] == pytest.approx(2 * half, rel=0.12)
+    assert said["cube.qw"] == 0.0

@@ -147,7 +147,7 @@ def test_a_law_that_stood_for_another_is_exchanged(tmp_path: Path, monkeypatch: 
         return whole(parent, from_parent(parent, first, np.arange(len(parent.likelihood.inputs)), 4))
 
     wrong = grown(grown(plain, "quadratic_drag"), "actuation_delay")
-    known = Known(Prior.of(asked), plain.free.alone, {})
+    known = Known(Prior.of(asked), plain.free.alone, {}, set())
     known.take([wrong])
     exchange(known, asked, {plain.name}, called=True)
     best, odds = known.ordered[0]
