@@ -8,6 +8,7 @@
 #   make soak    half an hour of full load: memory, lost messages, latency; ARGS="--minutes 5" for less
 #   make fuzz    100,000 damaged bags, 100,000 damaged YAML files, and the cells; a nightly job. make test tries some hundreds
 #   make cells   200 cells drawn at random, recorded and calibrated: results, one-line refusals, tracebacks
+#   make mutate  changes each number that decides a verdict and asks whether a test fails; a nightly job
 #   make bench   the benchmark of methods (docs/benchmarks.md); goes on where it was stopped
 #   make lint | readers | bags | lock | clean
 #
@@ -29,7 +30,7 @@ NATIVE := $(wildcard compass_ros/simulation/native/*.[ch])
 READERS := test/readers
 RERUN   := .venv-rerun
 
-.PHONY: demo prove real league test lint bench bags readers install interfaces lock clean soak fuzz cells
+.PHONY: demo prove real league test lint bench bags readers install interfaces lock clean soak fuzz cells mutate
 .DELETE_ON_ERROR:
 
 demo: install
@@ -46,6 +47,9 @@ soak: install
 
 cells: install
 	OMP_NUM_THREADS=1 $(BIN)/python -m test.faults.fuzz_cells $(ARGS)
+
+mutate: install
+	$(BIN)/python scripts/mutate.py $(ARGS)
 
 fuzz: cells
 	$(BIN)/python -m test.faults.fuzz_bags $(ARGS)

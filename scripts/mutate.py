@@ -16,7 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 DISCOVERY = Path("compass_ros", "discovery")
-TESTS = ("test_evidence.py", "test_first_order.py", "test_floor.py", "test_weigh.py", "test_servo.py", "test_unlisted.py")
+TESTS = tuple(f"test_{name}.py" for name in ("evidence", "first_order", "floor", "weigh", "servo", "unlisted"))
 """Of test/discovery: those that bring about verdicts on toys, the quick ones first."""
 
 
