@@ -65,7 +65,6 @@ setup(
     install_requires=[
         "annotated-types",
         "cma",
-        "gymnasium",
         "jinja2",
         "jsonschema",
         "lz4",
@@ -87,7 +86,6 @@ setup(
         "sbi",
         "scikit-learn<1.8",  # pysindy 1.7 calls what 1.8 took away
         "scipy",
-        "stable-baselines3",
         "threadpoolctl",
         "torch",
         "typer",

@@ -289,6 +289,8 @@ class Estimate:
     stop_reason: str
     """One sentence: why it stopped."""
     together: tuple[Together, ...] = ()
+    draws: Floats | None = None
+    """(N, P) of the posterior, where the method has one."""
     note: str = ""
     """What else a user should know of these values; empty where nothing."""
 

@@ -32,6 +32,7 @@ JOINS = {
     "proof": 6,
     "real": 6,
     "demo": 6,
+    "transfer": 6,
     "commands": 7,
     "cli": 8,
     "nodes": 8,
@@ -54,7 +55,6 @@ HOMES = {
     ("torch",): {"calibration", "policy"},
     ("numba",): {"worlds"},
     ("pysindy", "sklearn"): {"rivals"},
-    ("stable_baselines3", "gymnasium"): {"policy"},
     ("cv2",): {"tracking"},
     ("rosbags", "mcap", "mcap_ros2"): {"episodes"},
     ("rclpy", "launch", "launch_ros", "ament_index_python", "rcl_interfaces", "action_msgs"): {"nodes"},
@@ -86,6 +86,8 @@ NEIGHBOURS = {
     ("discovery", "calibration"),
     ("policy", "simulation"),
     ("real", "proof"),
+    ("policy", "cells"),
+    ("transfer", "bench"),
 }
 """Parts of one layer that know each other: what is simulated is a cell, an effect is part of a simulator, and sealed
 worlds and recordings of others are judged by the same command."""

@@ -29,6 +29,18 @@ class Tried:
     note: str
 
 
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """One explanation as a simulator, for those who want all of them."""
+
+    probability: float
+    simulator: Simulator
+    values: Floats
+    """(P + Q,)"""
+    root: Floats
+    """(P + Q, n) a square root of their covariance: values + root @ z, z standard normal, are as likely."""
+
+
 @dataclass(frozen=True)
 class Discovery:
     """The verdict, and the simulator with the effects inside where some were found."""
@@ -49,6 +61,8 @@ class Discovery:
     warnings: Sequence[str] = ()
     noise: Noise | None = None
     """With what the fit has shown of it, where that is more than the recordings alone did."""
+    weighed: tuple[Weighed, ...] = ()
+    """Explanations of known laws, and that nothing is missing, down to a hundredth of the probability."""
     open_sigma: float = 0.0
     """What the parameters' error bars leave open in held-out episodes, over the noise."""
 

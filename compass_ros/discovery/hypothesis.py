@@ -10,7 +10,7 @@ import numpy as np
 
 from compass_ros.calibration.least_squares import Fit, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.residuals import jackknife, variances
+from compass_ros.calibration.residuals import covariance, jackknife, variances
 from compass_ros.discovery.discrepancy import Free, free, spread, with_law
 from compass_ros.discovery.first_order import WIDTH
 from compass_ros.discovery.response import Response, respond
@@ -127,6 +127,15 @@ class Hypothesis:
             if attached.effect.scattered:  # of so few deviations
                 std[own] = self.fit.point.values[own] / np.sqrt(2 * len(self.likelihood.inputs))
         return std
+
+    @property
+    def root(self) -> Floats:
+        """(P + Q, n) a square root of the covariance of parameters and laws by the noise; none along the others."""
+        free = self.fit.free
+        root = np.zeros((len(self.fit.point.values), len(free)))
+        of_free = np.linalg.cholesky(covariance(self.likelihood, self.fit)[: len(free), : len(free)])
+        root[free] = of_free * self.likelihood.prior_std[free][:, None]
+        return root
 
     def own(self) -> Iterator[tuple[Attached, slice]]:
         """Each of its laws with the place of its numbers among all values."""

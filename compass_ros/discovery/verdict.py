@@ -9,7 +9,7 @@ import numpy as np
 
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
-from compass_ros.discovery.finding import Discovery, Tried, held_out_error
+from compass_ros.discovery.finding import Discovery, Tried, Weighed, held_out_error
 from compass_ros.discovery.floor import TWICE, shown_noise
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.maps import table_map
@@ -38,6 +38,8 @@ from compass_ros.types import (
 UNKNOWN = "unknown"
 SAID = 6
 """Models with laws that a result lists; the rest together are less than a thousandth or so."""
+LEAST = 0.01
+"""Probability below which a model is not handed on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +75,12 @@ class Judge:
         if not models or unknown > 0.5:
             return self._unknown()
         return self._named(models, "named" if len(models) == 1 else "ambiguous")
+
+    def _weighed(self) -> tuple[Weighed, ...]:
+        """The models that have a hundredth of the probability or more, the plain one among them."""
+        none, _, of_models = self.found.probabilities
+        rows = [(none, self.found.plain), *zip(of_models, self.found.models, strict=True)]
+        return tuple(Weighed(float(p), m.simulator, m.fit.point.values, m.root) for p, m in rows if p >= LEAST)
 
     def _explaining(self, of_models: Floats) -> list[Hypothesis]:
         """The smallest set of models that holds 1 - alpha, the most probable first.
@@ -166,12 +174,13 @@ class Judge:
         plain, cell = self.found.plain, len(self.simulator.cell.parameters)
         before = table_map(plain.response, plain.free.pushes)
         if best is None:
-            return Discovery(mismatch, tried=tried, before=before, warnings=self.warnings)
+            return Discovery(mismatch, tried=tried, before=before, warnings=self.warnings, weighed=self._weighed())
         values, std = best.fit.point.values, with_numerics(best)
         after = table_map(best.response, best.free.pushes)
         return Discovery(
-            mismatch, best.simulator, values, values[:cell], std[:cell], std, tried, before, after, self.warnings
-        )
+            mismatch, best.simulator, values, values[:cell], std[:cell], std, tried, before, after, self.warnings,
+            weighed=self._weighed(),
+        )  # fmt: skip
 
     def _explanations(self) -> tuple[Explanation, ...]:
         """That nothing is missing, `unknown`, and the most probable models, in the order of their probability.

@@ -22,7 +22,7 @@ def ended(velocity: tuple[float, float], physics: Physics = PLAIN, values: dict[
     """(18,) after 0.7 s of puck 1 alone, from the middle of the left half; the others stand far away."""
     state = np.zeros((1, discs.STATE))
     state[0, :6], state[0, 8:10] = (-0.25, 0.0, 0.4, 0.18, 0.4, -0.15), velocity
-    still = discs.told_by(values, np.array([[0.4, -0.15, 0.0, 1e3]]), strokes=0.0)
+    still = discs.told_by(values, np.array([[0.4, -0.15, 0.0, 1e3]]), faster=0.0)
     return np.asarray(soft.march(discs.motion(Rig(values), still, physics), state, 0.7, 1e-3)[-1, 0])
 
 
@@ -44,7 +44,7 @@ def test_without_laws_the_pucks_move_as_the_simulators_do_at_the_true_parameters
 def test_two_smooth_pucks_keep_momentum_and_energy_and_part_at_a_right_angle() -> None:
     state = np.zeros((1, discs.STATE))
     state[0, :6], state[0, 8:10] = (-0.3, 0.01, -0.2, -0.01, 0.3, -0.1), (0.5, 0.0)
-    still = discs.told_by(SMOOTH, np.array([[0.3, -0.1, 0.0, 1e3]]), strokes=0.0)
+    still = discs.told_by(SMOOTH, np.array([[0.3, -0.1, 0.0, 1e3]]), faster=0.0)
     after = soft.march(discs.motion(Rig(SMOOTH), still, PLAIN), state, 0.3, 2.5e-4)[-1, 0]
     one, two = after[8:10], after[10:12]
     assert one + two == pytest.approx([0.5, 0.0], abs=1e-9)

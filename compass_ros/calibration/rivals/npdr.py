@@ -13,6 +13,7 @@ theirs.
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -113,7 +114,9 @@ def npdr(problem: Problem, allowance: Allowance, seed: int, report: Report) -> E
             record.measure(low + width * drawn.mean(axis=0))
             if not record.proceed((i + 1) / allowance.iterations):
                 break
-    return record.estimate("all rounds done", values=low + width * drawn.mean(axis=0), std=width * drawn.std(axis=0))
+    draws = low + width * drawn
+    said = record.estimate("all rounds done", values=draws.mean(axis=0), std=draws.std(axis=0))
+    return replace(said, draws=draws)
 
 
 def _sample(posterior: NeuralPosterior, prior: BoxUniform, chains: int, seed: int) -> Floats:

@@ -153,25 +153,43 @@ def _apart(vector: Floats) -> tuple[Floats, Floats]:
     return distance, vector / distance[:, None]
 
 
-def told_by(values: Mapping[str, float], commands: Floats, strokes: Floats | float = 1.0) -> Told:
-    """Velocity of the pusher: a ramp up, a stroke, a turn, the way back, a ramp down, along the commanded heading.
+@dataclass(frozen=True)
+class Strokes:
+    """What the pusher is told in S shots: LEVELS of its speed at the knots, straight lines between them."""
 
-    `commands`: (S, 4) place x, y of the pusher, angle from the line to puck 1, speed.
+    knots: Floats
+    """(6, S) [s]"""
+    size: Floats
+    """(S,) [m/s]"""
+    along: Floats
+    """(S, 2) heading."""
+
+
+LEVELS = np.array([0.0, 1.0, 1.0, -1.0, -1.0, 0.0])
+
+
+def strokes(values: Mapping[str, float], commands: Floats, aim: Floats, faster: Floats | float = 1.0) -> Strokes:
+    """A ramp up, a stroke, a turn, the way back, a ramp down, along the commanded heading.
+
+    `commands`: (S, 4) place x, y of the pusher, angle from the line to (2,) `aim`, speed.
     """
     ramp, settle, stroke = (values[f"pusher@actuation@{name}"] for name in ("ramp_time", "settle_time", "stroke"))
-    speed = commands[:, 3]
-    aim = REST[0] - commands[:, :2]
-    heading = np.arctan2(aim[:, 1], aim[:, 0]) + commands[:, 2]
-    along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
-    size = values["pusher@actuation@vel_discount"] * speed * strokes
+    speed, away = commands[:, 3], aim - commands[:, :2]
+    heading = np.arctan2(away[:, 1], away[:, 0]) + commands[:, 2]
     out = stroke / speed
     corners = np.cumsum([np.full_like(speed, ramp), out, np.full_like(speed, settle), out], axis=0)
     knots = np.concatenate([np.zeros((1, len(speed))), corners, corners[-1:] + ramp])
-    levels = np.array([0.0, 1.0, 1.0, -1.0, -1.0, 0.0])
+    size = np.asarray(values["pusher@actuation@vel_discount"] * speed * faster)
+    return Strokes(knots, size, np.stack([np.cos(heading), np.sin(heading)], axis=1))
+
+
+def told_by(values: Mapping[str, float], commands: Floats, faster: Floats | float = 1.0) -> Told:
+    """Velocity of the pusher (`strokes`) towards puck 1."""
+    asked = strokes(values, commands, REST[0], faster)
 
     def told(time: float) -> Floats:
-        share = np.array([np.interp(time, knots[:, s], levels) for s in range(len(speed))])
-        return np.asarray((size * share)[:, None] * along)
+        share = np.array([np.interp(time, asked.knots[:, s], LEVELS) for s in range(len(asked.size))])
+        return np.asarray((asked.size * share)[:, None] * asked.along)
 
     return told
 

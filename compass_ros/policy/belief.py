@@ -1,0 +1,87 @@
+"""What is held true of a cell: simulators with draws of their parameters, each as probable as it is held to be."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.random import Generator
+
+from compass_ros.errors import DataError
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import Attached, effect
+from compass_ros.types import Floats
+
+Correction = Callable[[Floats, Floats, Floats], Floats]
+"""(B, A) commands, (F,) times [s], (B, F, C) what a simulator says -> (B, F, C) what is said instead."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One simulator."""
+
+    share: float
+    """How probable it is; all cases of a belief sum to one."""
+    simulator: Simulator
+    values: Floats
+    """(N, P) its parameters, and those of its laws: of N rows each rollout takes one at random."""
+
+    def observe(self, commands: Floats, time_s: Floats, rng: Generator) -> Floats:
+        """(B, F, C) for (B, A) commands at (F,) times; what laws of chance do is drawn for each."""
+        values = self.values[rng.integers(len(self.values), size=len(commands))]
+        inputs = self.simulator.inputs(commands)
+        if beyond := inputs.shape[1] - commands.shape[1]:
+            scatter = self.simulator.launch_std(self.values.mean(axis=0))[-beyond:]
+            inputs[:, -beyond:] = scatter * rng.standard_normal((len(inputs), beyond))
+        return self.simulator.observe(values, inputs, np.tile(time_s, (len(commands), 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """One or several simulators, and perhaps a correction of what they say."""
+
+    cases: tuple[Case, ...]
+    correction: Correction | None = None
+
+    def observe(self, commands: Floats, time_s: Floats, rng: Generator) -> Floats:
+        """(B, F, C) what the tracker would say; each row is one draw of what is held true."""
+        shares = np.array([case.share for case in self.cases])
+        of = rng.choice(len(shares), size=len(commands), p=shares / shares.sum())
+        parts = [(np.flatnonzero(of == i), case) for i, case in enumerate(self.cases)]
+        seen = [(rows, case.observe(commands[rows], time_s, rng)) for rows, case in parts if len(rows)]
+        out = np.empty((len(commands), *seen[0][1].shape[1:]))
+        for rows, said in seen:
+            out[rows] = said
+        return out if self.correction is None else self.correction(commands, time_s, out)
+
+
+def one(simulator: Simulator, values: Floats) -> Belief:
+    """One simulator with (P,) values, or with (N, P) draws."""
+    return Belief((Case(1.0, simulator, np.atleast_2d(values)),))
+
+
+def save(belief: Belief, path: Path) -> None:
+    """As JSON, without the correction. Raises DataError for a law whose numbers mean what one scene makes of them."""
+    rows = []
+    for case in belief.cases:
+        for attached in case.simulator.effects:
+            if effect(attached.effect.name) != attached.effect:
+                raise DataError(f"{path}: the law '{attached.effect.name}' is one of its scene, and is not kept")
+        laws = [[a.effect.name, list(a.objects)] for a in case.simulator.effects]
+        rows.append({"share": case.share, "laws": laws, "values": case.values.tolist()})
+    path.write_text(json.dumps(rows), encoding="utf-8")
+
+
+def load(path: Path, simulator: Simulator) -> Belief:
+    """What `save` has written, for the simulator of the cell without laws."""
+
+    def attached(laws: Sequence[Sequence[object]]) -> list[Attached]:
+        return [Attached(effect(str(name)), tuple(objects)) for name, objects in laws]  # type: ignore[arg-type]
+
+    rows = json.loads(path.read_text(encoding="utf-8"))
+    return Belief(
+        tuple(Case(r["share"], simulator.with_effects(attached(r["laws"])), np.array(r["values"])) for r in rows)
+    )

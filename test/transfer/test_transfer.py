@@ -1,0 +1,68 @@
+"""Rounds and campaigns with tiny budgets leave what they promise; the same seed gives the same rows."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compass_ros.errors import ConfigError
+from compass_ros.policy import belief, one
+from compass_ros.policy.residual import Residual
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import Attached, effect
+from compass_ros.transfer import campaign, table
+from compass_ros.transfer.experiment import air_hockey
+from compass_ros.transfer.loop import LoopConfig, run_loop
+
+TASK = air_hockey()
+
+
+def test_a_loop_leaves_policies_bags_and_rounds(tmp_path: Path) -> None:
+    config = LoopConfig("uniform", rounds=1, recordings=4, fresh=2, rollouts=64, judged=3)
+    rows = run_loop(TASK, "low", config, tmp_path, threads=1)
+    assert json.loads((tmp_path / "rounds.json").read_text()) == rows
+    assert [r["recordings"] for r in rows] == [4, 6]
+    assert all((tmp_path / f"round_{i}" / "policy.npz").is_file() for i in (0, 1))
+    assert len(list((tmp_path / "bags").iterdir())) == 4 + 2 * 2
+    assert run_loop(TASK, "low", config, tmp_path / "again", threads=1) == rows
+    with pytest.raises(ConfigError, match="no recordings in 'low-heavy'"):
+        run_loop(TASK, "low-heavy", config, tmp_path)
+
+
+def test_a_campaign_goes_on_where_it_was(tmp_path: Path) -> None:
+    file, plan = tmp_path / "rows.jsonl", campaign.Plan(("nominal",), ("low", "high", "low-moved"), 1, 4, 64)
+    assert campaign.compare(TASK, plan, file, tmp_path, 1) == 2
+    assert campaign.run(TASK, plan, file, tmp_path, 1) == 3
+    with file.open("a") as lines:
+        lines.write('{"torn')
+    assert campaign.run(TASK, plan, file, tmp_path, 1) == campaign.compare(TASK, plan, file, tmp_path, 1) == 0
+    low, high, moved = (r for r in campaign.read(file) if r["seed"] == 0)
+    assert low["action"] == high["action"] != moved["action"]
+    assert "as it was drawn" in table.tables(campaign.read(file))
+
+
+def test_a_belief_is_kept_with_its_laws_and_its_shares(tmp_path: Path) -> None:
+    plain = Simulator(TASK.cell, threads=1)
+    patched = plain.with_effects([Attached(effect("friction_patch"), ("puck1", "puck2"))])
+    values = np.concatenate([plain.defaults, [0.3, 0.0, 0.0, 0.2]])
+    two = belief.Belief((*one(plain, plain.defaults).cases, *one(patched, values).cases))
+    belief.save(two, tmp_path / "two.json")
+    again, command = belief.load(tmp_path / "two.json", plain), TASK.commands(8, 0)
+    said = [b.observe(command, np.array([1.0]), np.random.default_rng(3)) for b in (two, again)]
+    np.testing.assert_array_equal(said[0], said[1])
+    alone = [one(c.simulator, c.values).observe(command, np.array([1.0]), np.random.default_rng(0)) for c in two.cases]
+    assert {int(np.argmin([np.abs(a[i] - said[0][i]).max() for a in alone])) for i in range(8)} == {0, 1}
+
+
+def test_a_residual_network_learns_an_offset() -> None:
+    rng = np.random.default_rng(0)
+    command, time_s = rng.uniform(size=(10, 2)), np.linspace(0, 1, 20)
+    said = np.cumsum(rng.normal(size=(10, 20, 2)), axis=1)
+    network = Residual(command, time_s, said, said + 0.1 * command[:, :1, None], 0)
+    other = rng.uniform(0.2, 0.8, size=(5, 2))
+    fresh = np.cumsum(rng.normal(size=(5, 20, 2)), axis=1)
+    missed = network(other, time_s, fresh) - fresh - 0.1 * other[:, :1, None]
+    assert np.abs(missed).mean() < 0.5 * 0.1 * other[:, 0].mean()
