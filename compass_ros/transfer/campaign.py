@@ -12,7 +12,7 @@ import numpy as np
 
 from compass_ros.bench.outcome import append
 from compass_ros.errors import DataError
-from compass_ros.policy import ROLLOUTS, Belief, Shots, train
+from compass_ros.policy import ROLLOUTS, Belief, Shots, pushing, train
 from compass_ros.simulation.factors import factor_distance
 from compass_ros.transfer.experiment import Experiment
 from compass_ros.transfer.simulators import Makers, recorded
@@ -76,6 +76,8 @@ def one_policy(
         belief = experiment.itself(condition)
     elif condition != base:
         belief = experiment.told(belief, condition, own)
+    if experiment.over_time is not None:
+        return over_time(experiment, belief, simulator, own, seed, report)
     began = perf_counter()
     shots = Shots(experiment.cell, belief, experiment.goal, experiment.repeats)
     before = [known[key] for key in earlier(experiment, condition, simulator, plan, seed) if key in known]
@@ -92,6 +94,35 @@ def one_policy(
         "promised": round(expected.success, 3),
         "trained_s": round(wall, 1),
         "rollouts": plan.rollouts,
+    }
+
+
+def over_time(
+    experiment: Experiment, belief: Belief, simulator: str, folder: Path, seed: int, report: Report = silent,
+    transitions: int = pushing.TRANSITIONS,
+) -> dict[str, object]:  # fmt: skip
+    """Train and play one policy over time; it is kept in the folder."""
+    assert experiment.over_time is not None
+    count, repeats = pushing.SIDE_BY_SIDE, float(experiment.repeats[0])
+    own: pushing.Bars = (
+        experiment.over_time(count, seed) if simulator == "itself" else pushing.Simulated(belief, count, seed, repeats)
+    )
+    began = perf_counter()
+    policy = pushing.train_pushing(own, seed, transitions, report)
+    wall = perf_counter() - began
+    folder.mkdir(parents=True, exist_ok=True)
+    policy.save(folder / f"policy-{simulator}-{seed}.npz")
+    promised = pushing.near(pushing.played(policy, own)[-1])
+    end = pushing.played(policy, experiment.over_time(SHOTS, 1000 + seed))[-1]
+    hit, distance = pushing.near(end), np.linalg.norm(end[:, :2] - pushing.TARGET[:2], axis=1)
+    return {
+        "success": round(float(hit[:PAPER].mean()), 3),
+        "distance_m": round(float(distance[:PAPER].mean()), 4),
+        "success_100": round(float(hit[PAPER:].mean()), 3),
+        "distance_100_m": round(float(distance[PAPER:].mean()), 4),
+        "promised": round(float(promised.mean()), 3),
+        "trained_s": round(wall, 1),
+        "transitions": transitions,
     }
 
 

@@ -11,11 +11,13 @@ from numpy.random import Generator
 
 from compass_ros.cells import Cell, load
 from compass_ros.errors import ConfigError, nearest
-from compass_ros.policy import Belief, Case, Goal
+from compass_ros.policy import Belief, Case, Goal, pushing
+from compass_ros.policy.pushing import Bars
 from compass_ros.simulation import Simulator
 from compass_ros.types import Floats
 from compass_ros.worlds.bounce import cell as bounce
 from compass_ros.worlds.played import Played
+from compass_ros.worlds.push import cell as bar
 from compass_ros.worlds.table import cell as table
 from compass_ros.worlds.world import Task
 
@@ -42,6 +44,8 @@ class Experiment:
     the path is a folder for scenes."""
     changed: Mapping[str, str]
     """Changed conditions, and the one whose recordings simulators and policies come from."""
+    over_time: Callable[[int, int], Bars] | None = None
+    """Count, seed -> the concealed cell in steps, where a policy acts over time; None: its action is one command."""
     replayed: tuple[str, ...] = ()
     """Changed conditions of which nobody is told anything: the old policies play."""
 
@@ -99,7 +103,7 @@ def air_hockey() -> Experiment:
         play,
         _told_of_pucks,
         {"low-heavy": "low", "low-moved": "low", "low-faster": "low", "high-slower": "high"},
-        ("low-faster", "high-slower"),
+        replayed=("low-faster", "high-slower"),
     )
 
 
@@ -156,7 +160,31 @@ def bouncing_ball() -> Experiment:
     )
 
 
-EXPERIMENTS: Mapping[str, Callable[[], Experiment]] = {"air_hockey": air_hockey, "bouncing_ball": bouncing_ball}
+def push_i() -> Experiment:
+    """Push-I: a slender bar on three feet, a policy over 30 steps. Recordings are pushes of two velocities."""
+    cell = load("pushed_bar")
+    task = _task(cell)
+
+    def play(condition: str, commands: Floats, seed: int) -> Played:
+        return bar.push(task, commands, seed, cell.horizon)
+
+    return Experiment(
+        "push_i",
+        replace(cell, spec=replace(cell.spec, launch_noise={"y": bar.REPEATS_M})),
+        Goal("bar", (*pushing.TARGET[:2], 0.0), pushing.NEAR_M),
+        ("real",),
+        play,
+        lambda belief, condition, folder: belief,
+        {},
+        lambda count, seed: bar.Pushing(task, count, seed),
+    )
+
+
+EXPERIMENTS: Mapping[str, Callable[[], Experiment]] = {
+    "air_hockey": air_hockey,
+    "bouncing_ball": bouncing_ball,
+    "push_i": push_i,
+}
 
 
 def experiment(name: str) -> Experiment:

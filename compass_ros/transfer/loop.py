@@ -52,6 +52,8 @@ def run_loop(experiment: Experiment, condition: str, config: LoopConfig, out: Pa
     if condition not in experiment.conditions:
         known = ", ".join(experiment.conditions)
         raise ConfigError(f"{experiment.name}: no recordings in '{condition}'; known: {known}")
+    if experiment.over_time is not None:
+        raise ConfigError(f"{experiment.name}: the rounds are for shots; `compass policy --campaign` trains over time")
     if config.method not in NAMES or config.method in ("nominal", "itself"):
         raise ConfigError(f"--method: expected one of the simulators that are calibrated, found '{config.method}'")
     make_writable(out)

@@ -14,7 +14,7 @@ from compass_ros.policy.residual import Residual
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, effect
 from compass_ros.transfer import campaign, table
-from compass_ros.transfer.experiment import air_hockey
+from compass_ros.transfer.experiment import air_hockey, push_i
 from compass_ros.transfer.loop import LoopConfig, run_loop
 
 TASK = air_hockey()
@@ -42,6 +42,17 @@ def test_a_campaign_goes_on_where_it_was(tmp_path: Path) -> None:
     low, high, moved = (r for r in campaign.read(file) if r["seed"] == 0)
     assert low["action"] == high["action"] != moved["action"]
     assert "as it was drawn" in table.tables(campaign.read(file))
+
+
+def test_a_policy_over_time_is_trained_played_and_kept(tmp_path: Path) -> None:
+    task = push_i()
+    belief_ = one(Simulator(task.cell, threads=1, options={"timestep": 0.001}), task.cell.defaults)
+    rows = [campaign.over_time(task, belief_, "nominal", tmp_path, 0, transitions=64) for _ in range(2)]
+    assert {k: v for k, v in rows[0].items() if k != "trained_s"} == {
+        k: v for k, v in rows[1].items() if k != "trained_s"
+    }
+    assert (tmp_path / "policy-nominal-0.npz").is_file()
+    assert 0 <= float(str(rows[0]["success"])) <= 1
 
 
 def test_a_belief_is_kept_with_its_laws_and_its_shares(tmp_path: Path) -> None:

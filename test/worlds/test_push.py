@@ -13,6 +13,7 @@ from compass_ros.worlds.world import Asked
 from test.worlds.task import simulated, task_of
 from test.worlds.test_flight import same
 
+STILL = bar.told_by(np.zeros((1, 5)))
 CELL, TASK = task_of("pushed_bar")
 DEFAULT = {p.name: p.default for p in TASK.parameters}
 PUSHES = np.array([[0.0, 0.2, 0.0, 0.2, 0.0], [0.03, 0.2, 0.0, 0.3, 0.0], [-0.04, 0.15, 0.05, 0.25, -0.05]])
@@ -22,7 +23,7 @@ def slid(velocity: tuple[float, float, float], physics: Physics, duration_s: flo
     """(11,) where a bar ends that slides by itself, far from the tool."""
     state = np.zeros((1, 11))
     state[0, 3:6], state[0, 6] = velocity, -1.0
-    return np.asarray(soft.march(bar.motion(Rig(DEFAULT), np.zeros((1, 5)), physics), state, duration_s, 2.5e-4)[-1, 0])
+    return np.asarray(soft.march(bar.motion(Rig(DEFAULT), STILL, physics), state, duration_s, 2.5e-4)[-1, 0])
 
 
 def moving(slip: tuple[float, float], place: tuple[float, float] = (0.0, 0.0), path: float = 0.0) -> Feet:
@@ -68,7 +69,7 @@ def test_a_push_without_friction_keeps_momentum_and_energy() -> None:
     values = DEFAULT | {"tool@actuation@servo_gain": 0.0, "tool@contact@damping": 0.0}
     state = np.zeros((1, 11))
     state[0, 6:10] = bar.TOOL_X, 0.03, 0.2, 0.0
-    rate = bar.motion(Rig(values), np.zeros((1, 5)), Physics(bar.coulomb(0.0)))
+    rate = bar.motion(Rig(values), STILL, Physics(bar.coulomb(0.0)))
     after = soft.march(rate, state, 0.3, 2.5e-4)[-1, 0]
     assert 0.3 * after[3] + 8 * after[8] == pytest.approx(8 * 0.2, rel=1e-9)
     energy = 0.3 * (after[3] ** 2 + after[4] ** 2) + bar.INERTIA * after[5] ** 2 + 8 * (after[8] ** 2 + after[9] ** 2)

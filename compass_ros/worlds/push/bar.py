@@ -97,16 +97,16 @@ def play(rig: Rig, commands: Floats, duration_s: float, physics: Physics) -> Flo
     first = np.zeros((len(commands), 11))
     first[:, :2] = rig.centre
     first[:, 6], first[:, 7] = TOOL_X, commands[:, 0]
-    return soft.march(motion(rig, commands, physics), first, duration_s, STEP_S)
+    told = told_by(commands * rig.values["tool@actuation@vel_discount"])
+    return soft.march(motion(rig, told, physics), first, duration_s, STEP_S)
 
 
-def motion(rig: Rig, commands: Floats, physics: Physics) -> Callable[[float, Floats], Floats]:
-    """Time and (S, 11) states -> their rates."""
+def motion(rig: Rig, asked: Told, physics: Physics) -> Callable[[float, Floats], Floats]:
+    """Time and (S, 11) states -> their rates. `asked`: what the servos are told, before a law of the drive."""
     v, give = rig.values, rig.give
     mass, gain = v["bar@dyna@mass"], v["tool@actuation@servo_gain"]
     inertia = INERTIA * mass / MASS_KG
     arms = FEET - rig.centre
-    asked = told_by(commands * v["tool@actuation@vel_discount"])
     told = asked if physics.drive is None else physics.drive(asked)
 
     def rate(time: float, state: Floats) -> Floats:
