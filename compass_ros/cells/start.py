@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
 
 from compass_ros.cells.series import Name
 from compass_ros.cells.signals import Signal
@@ -41,9 +42,12 @@ _GROUPS: Mapping[str, tuple[str, ...]] = {
 _UNIT = ("qw", "qx", "qy", "qz")
 """Numbers of an orientation: it is moved by a rotation vector instead."""
 _NS = 1e-9
+CHANCE = 1e-3
+"""Probability with which noise alone scatters frames about a polynomial by more than it may: of a hundred first states
+hardly one is taken for one that no polynomial goes through."""
 FORM = 2.0
-"""Error of a first state by the form of a motion, in what the frames show of it: of oscillations up to 8 Hz in frames
-at 60 Hz the root mean square is 0.6 to 2.3 of that, with 5, 6 and 9 frames."""
+"""Error of a first state where no polynomial goes through the frames, in what they show of it: of oscillations up to
+8 Hz in frames at 60 Hz the root mean square is 0.6 to 2.3 of that, with 5, 6 and 9 frames."""
 Deviation = Annotated[float, Field(ge=0)]
 
 
@@ -54,8 +58,8 @@ class StartSpec:
     object: Name
     velocity: Literal["track", "rest"] = "track"
     """Where the recording states no first velocity: from the first frames of the track, or zero."""
-    frames: int = Field(default=5, ge=2)
-    """Frames of the track from which a first velocity is taken."""
+    frames: int = Field(default=6, ge=2)
+    """Frames of the track from which a first velocity is taken. Six show what a parabola gets wrong."""
     noise: Mapping[Literal["position", "velocity", "orientation", "rate"], Deviation] | None = None
     """Standard deviation of the first position [m or rad], velocity [m/s or rad/s], orientation [rad], rate [rad/s].
     None: as exact as the frames from which it was read say; what the recording states is exact."""
@@ -202,23 +206,23 @@ def _gain(time: Floats) -> Floats:
 def _form_error(spec: StartSpec, signal: Signal, episode: Episode, noise: float) -> Floats:
     """(A,) error of the first state that a track says: no motion is a parabola.
 
-    FORM times the larger of two: what a cubic through the same frames says differently; and what their scatter about
-    the parabola, beyond the noise, does to it (Birge 1932). Of a pose's turn nothing is known.
+    What a cubic through the same frames says differently, of six or more. Where the scatter about the parabola is no
+    noise, FORM times that or what the scatter does to the coefficients (Birge 1932). Of a pose's turn nothing is known.
     """
     out = np.zeros(len(_names(signal)))
     if spec.velocity == "rest":
         return out
     time, value = _beginning(spec, episode)
     linear, numbers = value[:, :3] if signal.quantity == "pose" else value, _numbers(time)
-    fit = _through(time, linear, numbers)
-    left = linear - np.vander(time, numbers, increasing=True) @ fit
-    scatter = np.sum(left**2, axis=0) / max(len(time) - numbers, 1)
-    error = _gain(time)[:, None] * np.sqrt(np.maximum(scatter - noise**2, 0.0))
-    if len(time) > numbers + 1:
-        error = np.maximum(error, np.abs(_through(time, linear, numbers + 1)[:2] - fit[:2]))
+    fit, free = _through(time, linear, numbers), max(len(time) - numbers, 1)
+    scatter = np.sum((linear - np.vander(time, numbers, increasing=True) @ fit) ** 2, axis=0) / free
+    cubic = np.abs(_through(time, linear, 4)[:2] - fit[:2]) if len(time) >= 5 else np.zeros_like(fit[:2])
+    of_scatter = _gain(time)[:, None] * np.sqrt(scatter)
+    none = scatter > noise**2 * chi2.isf(CHANCE, free) / free  # (d,) where no polynomial goes through
+    error = np.where(none, FORM * np.maximum(cubic, of_scatter), cubic if len(time) >= 6 else 0.0)
     first, size = positions_in_state(signal), linear.shape[1]
-    out[:size] = 0.0 if episode.initial_state.get(spec.object) else FORM * error[0]
-    out[first : first + size] = FORM * error[1]
+    out[:size] = 0.0 if episode.initial_state.get(spec.object) else error[0]
+    out[first : first + size] = error[1]
     return out
 
 
