@@ -13,7 +13,6 @@ from compass_ros.calibration.methods import method
 from compass_ros.calibration.noise import measure_noise
 from compass_ros.calibration.problem import Allowance
 from compass_ros.config import CalibrationConfig
-from compass_ros.discovery import Discovery
 from compass_ros.errors import ConfigError, nearest
 from compass_ros.pipeline import calibrate
 from compass_ros.policy import Belief, Case, belief, one
@@ -23,7 +22,7 @@ from compass_ros.results import write_all
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import recordings
 from compass_ros.transfer.experiment import Experiment
-from compass_ros.types import Episode, Floats, Report, Result, silent
+from compass_ros.types import Episode, Floats, Report, silent
 
 COARSER = 2.0
 """Time step in which policies are trained, over the scene's. On the table a shot then ends 3 mm elsewhere (median)."""
@@ -40,7 +39,9 @@ NAMES: Mapping[str, str] = {
     "residual": "ours, parameters alone, and a network on what they leave",
     "itself": "trained in the real cell: the most that can be reached",
 }
-OURS = ("parameters", "laws", "posterior")
+SEARCHED = ("laws", "posterior")
+"""Those that a search for missing physics gives."""
+HELD_OUT = 0.2
 
 
 @dataclass(frozen=True)
@@ -68,8 +69,8 @@ class Makers:
         path = self.folder / f"{name}.json"
         if not path.exists():
             self.folder.mkdir(parents=True, exist_ok=True)
-            if name in OURS:
-                self._ours()
+            if name in SEARCHED:
+                self._with_laws()
             else:
                 belief.save(one(self._fine, self._drawn(name)), path)
         return belief.load(path, self._fine if fine else self._coarse)
@@ -92,25 +93,27 @@ class Makers:
             wide = np.array([p.half_width for p in cell.parameters])
             drawn = np.random.default_rng([self.seed, 8]).uniform(-1, 1, (DRAWS, len(wide)))
             return _inside(cell.defaults + wide * drawn, self._fine)
+        if name == "parameters":
+            return self._alone()[None]
         data = recordings(cell, self.episodes)
         noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
         allowance = Allowance(self.iterations, min(10, len(self.episodes)), 64)
         found = method(name).run(pose(self._fine, data, noise), allowance, self.seed, self.report)
         return found.values[None] if found.draws is None else found.draws
 
-    def _ours(self) -> None:
-        """One calibration gives three simulators, and everything that `compass calibrate` writes."""
-        alone: list[Floats] = []
+    def _alone(self) -> Floats:
+        """(P,) our calibration without a search for what is missing."""
+        config = CalibrationConfig(seed=self.seed, threads=self.threads, held_out_share=HELD_OUT, discover=False)
+        result, _ = calibrate(self.episodes, self.experiment.cell, config, self.report)
+        return np.array([row.value for row in result.parameters])
 
-        def keep(result: Result, found: Discovery) -> None:
-            alone.append(np.array([row.value for row in result.parameters]))
-
+    def _with_laws(self) -> None:
+        """One calibration gives two simulators, and everything that `compass calibrate` writes."""
         cell = self.experiment.cell
-        config = CalibrationConfig(seed=self.seed, threads=self.threads, held_out_share=0.2)
-        result, found = calibrate(self.episodes, cell, config, self.report, keep)
+        config = CalibrationConfig(seed=self.seed, threads=self.threads, held_out_share=HELD_OUT)
+        result, found = calibrate(self.episodes, cell, config, self.report)
         write_all(result, found, cell, self.folder / "calibration")
-        values = alone[0] if alone else np.array([row.value for row in result.parameters])
-        belief.save(one(self._fine, values), self.folder / "parameters.json")
+        values = np.array([row.value for row in result.parameters])
         simulator, numbers = found.simulator or self._fine, values if found.values is None else found.values
         belief.save(one(simulator, numbers), self.folder / "laws.json")
         rng = np.random.default_rng([self.seed, 9])

@@ -1,4 +1,4 @@
-"""The real cells of ball and bar: without what their drawings lack they are what the simulator says, and a seed is all."""
+"""The real cells of ball and bar: without what their drawings lack they are what the simulator says."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from test.worlds.task import task_of
 
 
 def test_a_ball_falls_as_the_laws_of_falling_say_until_it_bounces() -> None:
-    cell, task = task_of("bouncing_ball")
+    _, task = task_of("bouncing_ball")
     one_drop, again = (bounce.drop(task, np.array([[0.3], [0.32]]), 1, steps=6) for _ in range(2))
     np.testing.assert_array_equal(one_drop.seen, again.seen)
     fallen = one_drop.seen[:, 0, 2] - one_drop.seen[:, 5, 2]
@@ -39,7 +39,7 @@ def test_bars_are_pushed_as_in_the_simulator_with_their_parameters() -> None:
 
 
 def test_two_velocities_told_step_by_step_are_a_recorded_push() -> None:
-    cell, task = task_of("pushed_bar")
+    _, task = task_of("pushed_bar")
     command = np.array([[0.0, 0.2, 0.02, 0.3, -0.02]])
     played = push.push(task, command, 3, steps=14)
     stepped = push.Pushing(task, 1, 0, noisy=False)
