@@ -279,17 +279,20 @@ def with_roughness(likelihood: Likelihood, fit: Fit, draws: int = 6) -> Likeliho
     return replace(likelihood, sigma=np.hypot(likelihood.sigma, grown))
 
 
-def with_launches(likelihood: Likelihood, values: Floats, free: Ints = NONE, steps: Floats | None = None) -> Point:
+def with_launches(likelihood: Likelihood, values: Floats) -> Point:
     """(P,) values that stay as they are, each episode with the launch that agrees best with it.
 
-    Those that are `free` may move; (p,) `steps` of their differences, where known.
+    On a horizon that grows as the fit's does, and for its reason.
     """
     point = start(likelihood, values)
-    if not likelihood.launch_std.any() and not len(free):
+    if not likelihood.launch_std.any():
         return point
-    robust = max(ROBUST, 3.0 * typical_residual(likelihood, point))
-    most = OF_WINDOWS if likelihood.windowed and not len(free) else 12
-    return minimise(likelihood, point, free, most, robust, tolerance=1.0, fresh=False, steps=steps).point
+    most = OF_WINDOWS if likelihood.windowed else 12
+    for share in likelihood.horizons:
+        part = likelihood.until(share * float(likelihood.time_s.max()))
+        robust = max(ROBUST, 3.0 * typical_residual(part, point))
+        point = minimise(part, point, NONE, most, robust, tolerance=1.0, fresh=False).point
+    return point
 
 
 def standard_errors(refined: Refined) -> tuple[Ints, Floats]:

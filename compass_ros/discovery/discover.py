@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import log
 
 import numpy as np
 
@@ -68,7 +69,11 @@ def weigh(
     tell: Tell,
     warnings: tuple[str, ...] = (),
 ) -> Discovery:
-    """What the recordings call for; `held_out` is opened after the verdict, to say what it is worth."""
+    """What the recordings call for; `held_out` is opened after the verdict, to say what it is worth.
+
+    Something is missing where the odds against the plain model exceed those that noise reaches with probability alpha,
+    and those that leave the plain model a probability of alpha.
+    """
     likelihood = refined.likelihood
     plain = Hypothesis((), simulator, likelihood, refined.fit)
     asked = candidates(simulator, plain.response.values, likelihood.inputs, likelihood.time_s)
@@ -76,7 +81,7 @@ def weigh(
     prior = Prior.of(asked)
     priors = [prior.of_laws([f.candidate.name]) for f in first]
     odds = largest_odds(plain.response, first, priors, noise, alpha, seed)
-    threshold = max(float(np.quantile(odds, 1 - alpha)), 0.0)
+    threshold = max(float(np.quantile(odds, 1 - alpha)), log((1 - alpha) / alpha))
     tell("fit effects", 0.3)
     found = search(plain, first, asked, threshold, tell)
     best = max([found.unknown, *found.odds])
