@@ -1,32 +1,63 @@
-"""compass_ros for pip and for colcon (ament_python): one package, two installers."""
+"""What of the package needs code; everything else is in pyproject.toml. For pip and for colcon (ament_python)."""
 
+from __future__ import annotations
+
+import os
+import sys
 from importlib.util import find_spec
 from pathlib import Path
 
 from setuptools import Extension, find_packages, setup
+from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_ext import build_ext
 
 NAME = "compass_ros"
 ROOT = Path(__file__).parent
+NATIVE = Path(NAME, "simulation", "native")
+OPTIONS = ["-O2", "-ffp-contract=off"]
+"""As in simulation/native/compiled.py."""
 
 
 class PlainLibrary(build_ext):
-    """Names the library `_fields.so`: it is no Python module and depends on no version of Python."""
+    """Names the libraries `_fields*.so`: they are no Python modules and depend on no version of Python."""
 
     def get_ext_filename(self, fullname: str) -> str:
         return str(Path(*fullname.split(".")).with_suffix(".so"))
 
 
+class AnyPython(bdist_wheel):
+    """One wheel for every Python 3 of a machine."""
+
+    def get_tag(self) -> tuple[str, str, str]:
+        return "py3", "none", super().get_tag()[2]
+
+
 def native() -> list[Extension]:
-    """The table's forces as a compiled MuJoCo callback; a plain library, loaded by path and not imported."""
-    mujoco = find_spec("mujoco")
-    if mujoco is None or mujoco.origin is None:
-        raise SystemExit("setup.py: compass_ros is compiled against mujoco: pip install -r requirements.lock first")
-    include = Path(mujoco.origin).parent / "include"
-    source = str(Path(NAME, "simulation", "native", "fields.c"))
-    options = ["-O2", "-ffp-contract=off"]  # same bits on every machine: no fused operations
-    name = f"{NAME}.simulation.native._fields"
-    return [Extension(name, [source], include_dirs=[str(include)], extra_compile_args=options)]
+    """The forces as a compiled MuJoCo callback; plain libraries, loaded by path and not imported.
+
+    For the MuJoCo that is installed, as `_fields.so`; where COMPASS_HEADERS names a folder of `scripts/headers.py`, for
+    each version in it.
+    """
+    headers = os.environ.get("COMPASS_HEADERS")
+    if headers:
+        found = {f"_fields_{path.name.replace('.', '_')}": path for path in sorted(Path(headers).iterdir())}
+    else:
+        mujoco = find_spec("mujoco")
+        if mujoco is None or mujoco.origin is None:
+            raise SystemExit("setup.py: compass_ros is compiled against mujoco: pip install -r requirements.lock first")
+        found = {"_fields": Path(mujoco.origin).parent / "include"}
+    depends = [str(NATIVE / name) for name in ("pairs.h", "drives.h", "program.py")]
+    return [
+        Extension(
+            f"{NAME}.simulation.native.{name}",
+            [str(NATIVE / "fields.c")],
+            include_dirs=[str(include)],
+            extra_compile_args=OPTIONS,
+            depends=depends,
+            libraries=["m"],
+        )
+        for name, include in found.items()
+    ]
 
 
 def shared(folder: str) -> list[tuple[str, list[str]]]:
@@ -36,22 +67,15 @@ def shared(folder: str) -> list[tuple[str, list[str]]]:
     return [(f"share/{NAME}/{path.parent}", [str(path)]) for path in files]
 
 
+sys.path.insert(0, str(ROOT))  # pyproject.toml asks the package for its version
 setup(
     name=NAME,
-    version="0.1.0",
-    description="Calibrates robot simulators from recorded trajectories and discovers the physics that they lack",
-    license="Apache-2.0",
-    license_files=["LICENSE"],
-    python_requires=">=3.10",
+    python_requires=">=3.11",
     # The cells travel inside the package, where the core finds them without ROS.
     packages=[*find_packages(include=[NAME, f"{NAME}.*"]), f"{NAME}.config.cells"],
     package_dir={f"{NAME}.config.cells": "config/cells"},
-    package_data={
-        NAME: ["py.typed", "**/*.json", "**/*.j2", "**/*.css", "**/*.js", "**/*.c", "**/*.h"],
-        f"{NAME}.config.cells": ["*.yaml", "*.xml"],
-    },
     ext_modules=native(),
-    cmdclass={"build_ext": PlainLibrary},
+    cmdclass={"build_ext": PlainLibrary, "bdist_wheel": AnyPython},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -60,36 +84,4 @@ setup(
         *shared("config"),
         *shared("launch"),
     ],
-    zip_safe=False,
-    # ROS itself is not named here: on a robot it comes from apt, elsewhere from requirements.lock.
-    install_requires=[
-        "annotated-types",
-        "cma",
-        "jinja2",
-        "jsonschema",
-        "lz4",
-        "markupsafe",
-        "matplotlib",
-        "mcap",
-        "mujoco>=3.9,<3.10",
-        "numba",  # the concealed arms: equations of motion, compiled
-        "numpy",
-        "opencv-python",
-        "openpyxl",
-        "plotly",  # its bundle of JavaScript goes into the report
-        "pydantic>=2",
-        "pysindy<2",  # 2 wants numpy 2, which mink, and so robosuite, does not take
-        "pyyaml",
-        "rich",
-        "robosuite",
-        "rosbags",
-        "sbi",
-        "scikit-learn<1.8",  # pysindy 1.7 calls what 1.8 took away
-        "scipy",
-        "threadpoolctl",
-        "torch",
-        "typer",
-        "zstandard",
-    ],
-    entry_points={"console_scripts": ["compass = compass_ros.cli:main"]},
 )

@@ -30,6 +30,7 @@ from compass_ros.commands import (
 )
 from compass_ros.commands import import_ as tables
 from compass_ros.errors import CompassError
+from compass_ros.extras import what_to_install
 
 app = typer.Typer(
     add_completion=False,
@@ -67,6 +68,12 @@ def main() -> None:
         app()
     except CompassError as error:
         print(f"compass: {error}", file=sys.stderr)
+        sys.exit(1)
+    except ModuleNotFoundError as error:
+        said = what_to_install(error)
+        if said is None:
+            raise
+        print(f"compass: {said}", file=sys.stderr)
         sys.exit(1)
 
 

@@ -41,6 +41,7 @@ JOINS = {
 LAYERS = {
     "types": 0,
     "errors": 0,
+    "extras": 0,
     "plain_yaml": 0,
     "places": 0,
     "config": 1,

@@ -9,16 +9,23 @@ import shlex
 import shutil
 import subprocess
 import sys
-import sysconfig
 from collections.abc import Iterator
-from importlib.metadata import Distribution, packages_distributions
+from importlib.metadata import packages_distributions
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
+import mujoco
 import pytest
+import tomllib
 
+import compass_ros
+from compass_ros.errors import ConfigError
+from compass_ros.extras import EXTRAS, OF_ROS
 from compass_ros.nodes import INTERFACES, MISSING
+from compass_ros.simulation.native import compiled
+from compass_ros.simulation.native.compiled import OPTIONS
+from scripts.headers import VERSIONS
 from test.test_layering import HOMES, MODULES, ROOT, imports
 
 NODES = ("calibration_client", "calibrator", "puck_tracker", "recorder", "shooter", "virtual_cell")
@@ -31,10 +38,24 @@ def plain(name: str) -> str:
     return re.split(r"[^A-Za-z0-9._-]", name)[0].lower().replace("_", "-")
 
 
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+APART = {"ray"}
+"""Extras that are tested in an environment of their own, and so not locked."""
+
+
+def extra(name: str) -> set[str]:
+    """Libraries of an extra."""
+    return {plain(library) for library in PROJECT["optional-dependencies"][name]}
+
+
+def core() -> set[str]:
+    """Libraries without which nothing works."""
+    return {plain(library) for library in PROJECT["dependencies"]}
+
+
 def declared() -> set[str]:
-    """What the installed package says that it needs; not what an old build may have left in the working directory."""
-    (installed,) = Distribution.discover(name="compass-ros", path=[sysconfig.get_path("purelib")])
-    return {plain(name) for name in installed.requires or ()}
+    """All of them."""
+    return core().union(*map(extra, PROJECT["optional-dependencies"])) - APART
 
 
 def reached_by_name(tree: ast.AST) -> Iterator[str]:
@@ -95,7 +116,7 @@ def test_a_library_that_is_reached_by_name_is_seen(source: str) -> None:
 def test_every_library_that_is_used_is_declared_and_the_other_way_round() -> None:
     trees = [ast.parse(path.read_text("utf-8")) for path in MODULES]
     firsts = {name.partition(".")[0] for tree in trees for name in (*imports(tree), *reached_by_name(tree))}
-    foreign = firsts - sys.stdlib_module_names - FROM_ROS - {"compass_ros"}
+    foreign = firsts - sys.stdlib_module_names - FROM_ROS - APART - {"compass_ros"}
     owners = packages_distributions()
     imported = {plain(owners[name][0]) for name in foreign}
     assert imported == declared()
@@ -129,8 +150,8 @@ def test_ros2_run_finds_a_stub_that_starts_the_node(node: str) -> None:
 ROSDEP = {
     "jinja2": "python3-jinja2", "jsonschema": "python3-jsonschema", "matplotlib": "python3-matplotlib",
     "numpy": "python3-numpy", "opencv-python": "python3-opencv", "openpyxl": "python3-openpyxl",
-    "pydantic": "python3-pydantic", "pyyaml": "python3-yaml", "rich": "python3-rich", "scikit-learn": "python3-sklearn",
-    "scipy": "python3-scipy", "torch": "python3-torch", "typer": "python3-typer",
+    "pydantic": "python3-pydantic", "pyyaml": "python3-yaml", "rich": "python3-rich", "scipy": "python3-scipy",
+    "typer": "python3-typer",
 }  # fmt: skip
 """Libraries that rosdep has from Ubuntu's packages (rosdistro, rosdep/python.yaml); of others it has none, or pip's."""
 STARTED = {"launch", "launch_ros", "tf2_ros", "rmw_fastrtps_cpp"}
@@ -143,7 +164,8 @@ def depends(kind: str) -> set[str]:
 
 def test_package_xml_names_all_that_is_imported_and_all_that_rosdep_has() -> None:
     firsts = {name.partition(".")[0] for path in MODULES for name in imports(ast.parse(path.read_text("utf-8")))}
-    expected = (firsts & FROM_ROS) | STARTED | {ROSDEP[name] for name in declared() & ROSDEP.keys()}
+    on_a_robot = core() | extra("ros") | extra("report")
+    expected = (firsts & FROM_ROS) | STARTED | {ROSDEP[name] for name in on_a_robot & ROSDEP.keys()}
     assert depends("exec_depend") == expected
 
 
@@ -200,3 +222,103 @@ def test_a_node_without_its_messages_says_what_to_run(missing: str, node: str) -
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr == f"compass_ros: {MISSING[missing]}\n"
+
+
+def test_versions_and_maintainers_stand_once() -> None:
+    for manifest in ("package.xml", "msg_schemas/package.xml"):
+        read = ElementTree.parse(ROOT / manifest)
+        assert read.findtext("version") == compass_ros.__version__
+        assert read.findtext("license") == PROJECT["license"]
+        assert read.find("maintainer") is not None
+    assert "version" in PROJECT["dynamic"], "compass_ros.__version__ is the one place"
+
+
+def test_a_wheel_compiles_as_every_other_installation() -> None:
+    """The options of the two compilations, and the versions of MuJoCo that a wheel has forces for."""
+    setup = ast.parse((ROOT / "setup.py").read_text(encoding="utf-8"))
+    (options,) = (
+        ast.literal_eval(node.value)
+        for node in setup.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "OPTIONS"
+    )
+    assert tuple(options) == OPTIONS
+    needed = next(line for line in PROJECT["dependencies"] if plain(line) == "mujoco")
+    low, high = VERSIONS[0].rpartition(".")[0], VERSIONS[-1].split(".")
+    assert needed == f"mujoco>={low},<{high[0]}.{int(high[1]) + 1}"
+
+
+def test_forces_are_compiled_where_no_shipped_library_fits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_HOME", str(tmp_path))
+    monkeypatch.setattr(compiled, "headers_of", lambda path: None)
+    made = compiled.compiled_forces()
+    assert made.is_relative_to(tmp_path)
+    monkeypatch.undo()
+    assert compiled.headers_of(made) == mujoco.mj_version()
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "other"))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    with pytest.raises(ConfigError, match=r"no compiled forces for MuJoCo .*, and no C compiler"):
+        compiled.compile_forces(Path(mujoco.__file__).parent / "include")
+
+
+# What an installation without extras is: nothing that only extras bring can be imported.
+WITHOUT = """
+import importlib.abc, sys
+class Without(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {missing}:
+            raise ModuleNotFoundError("No module named " + repr(name), name=name)
+sys.meta_path.insert(0, Without())
+from compass_ros.cli import main
+sys.argv = ["compass", *{words}]
+main()
+"""
+
+
+def without_extras(*words: object) -> subprocess.CompletedProcess[str]:
+    """A command line where no library of an extra is installed."""
+    missing = {*EXTRAS, "rclpy", "compass_ros_interfaces"}
+    code = WITHOUT.format(missing=missing, words=[str(word) for word in words])
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+
+
+def test_the_core_makes_bags_into_a_report(tmp_path: Path) -> None:
+    bags = [ROOT / "examples" / "own_cell" / "bags" / f"swing_{number}" for number in (1, 2, 3)]
+    cell = ("--cell", ROOT / "examples" / "own_cell" / "pendulum.yaml")
+    done = without_extras("calibrate", *cell, "--no-discover", "--progress", "none", "--out", tmp_path, *bags)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "report.html").stat().st_size > 1e6
+
+
+@pytest.mark.parametrize(
+    ("words", "library", "brings"),
+    [
+        (("policy", "RESULT"), "torch", "policy"),
+        (("diagnose", "RESULT"), "matplotlib", "report"),
+        (("track", "film.mp4", "--camera", "camera.yaml"), "cv2", "track"),
+    ],
+)
+def test_a_command_says_which_extra_it_needs(words: tuple[str, ...], library: str, brings: str) -> None:
+    done = without_extras(*words)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == f"compass: needs {library}, which is not installed: pip install 'compass_ros[{brings}]'\n"
+
+
+def test_every_library_of_an_extra_has_its_advice() -> None:
+    """The table of advice is that of pyproject.toml, by the names that are imported."""
+    owners = packages_distributions()
+    for module, name in EXTRAS.items():
+        if module in OF_ROS:
+            continue
+        assert (plain(owners[module][0]) if module in owners else module) in extra(name)
+    only = set().union(*map(extra, PROJECT["optional-dependencies"])) - core() - APART
+    assert only == {plain(owners[module][0]) for module in EXTRAS if module in owners and module not in OF_ROS}
+
+
+def test_the_package_is_imported_in_no_time() -> None:
+    code = (
+        "import sys, time; begun = time.perf_counter(); import compass_ros; print(time.perf_counter() - begun);"
+        "assert 'numpy' not in sys.modules"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert float(done.stdout) < 0.3

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from compass_ros.cells.fields import names
+from compass_ros.cells.inertia import mass_diagonal
 from compass_ros.cells.scene_source import scene_source
 from compass_ros.errors import ConfigError
 from compass_ros.types import Floats
@@ -93,9 +94,7 @@ def inertias(robot: Robot, joints: tuple[str, ...], positions: Floats) -> Floats
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_makeM(model, data)
-        whole = np.zeros((model.nv, model.nv))
-        mujoco.mj_fullM(model, whole, data.qM)
-        found.append(np.diag(whole)[dofs])
+        found.append(mass_diagonal(model, data)[dofs])
     return np.asarray(np.median(found, axis=0))
 
 

@@ -8,12 +8,14 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from compass_ros.cells import Cell
 from compass_ros.commands.progress import Bar
+
+if TYPE_CHECKING:
+    from compass_ros.cells import Cell
 
 ANSWERS = Path("~/.local/share/compass_ros/answers")
 DEFAULT_EFFECT = "swirl"

@@ -2,6 +2,8 @@
 
 from importlib.util import find_spec
 
+from compass_ros.extras import advice
+
 INTERFACES = "compass_ros_interfaces"
 MISSING = {
     "rclpy": "ROS 2 is not here: . /opt/ros/jazzy/setup.bash, or `make install` where there is no ROS",
@@ -13,6 +15,8 @@ MISSING = {
 }
 """What a node cannot do without, and what to run where it is not there."""
 
+if find_spec("cv2") is None:
+    raise SystemExit(f"compass_ros: {advice('cv2')}")
 for _name, _what in MISSING.items():
     if find_spec(_name) is None:
         raise SystemExit(f"compass_ros: {_what}")

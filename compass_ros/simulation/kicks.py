@@ -8,6 +8,7 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 
+from compass_ros.cells.inertia import mass_matrix
 from compass_ros.simulation.simulator import CHUNK, Simulator
 from compass_ros.simulation.transitions import Chart, chained, changes
 from compass_ros.types import Floats
@@ -137,5 +138,5 @@ def inertias(simulator: Simulator, values: Floats, states: Floats) -> Floats:
     for e, k in np.ndindex(*states.shape[:2]):
         mujoco.mj_setState(model, data, states[e, k], mujoco.mjtState.mjSTATE_FULLPHYSICS)
         mujoco.mj_fwdPosition(model, data)
-        mujoco.mj_fullM(model, out[e, k], data.qM)
+        out[e, k] = mass_matrix(model, data)
     return out

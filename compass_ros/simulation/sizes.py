@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from compass_ros.cells.inertia import mass_diagonal
 from compass_ros.simulation.sites import OF_JOINT, ONE_DOF, SPEED_DRIVES, Site, SiteKind
 from compass_ros.types import Floats
 
@@ -139,7 +140,13 @@ def _moment(model: mujoco.MjModel, data: mujoco.MjData) -> Floats:
         if model.jnt_type[joint] in ONE_DOF:
             position[model.jnt_dofadr[joint]] = data.qpos[model.jnt_qposadr[joint]]
     return np.stack(
-        [data.qM[model.dof_Madr], position, data.qvel, data.qfrc_bias, data.qfrc_actuator + data.qfrc_applied]
+        [
+            mass_diagonal(model, data),
+            position,
+            data.qvel,
+            data.qfrc_bias,
+            data.qfrc_actuator + data.qfrc_applied,
+        ]
     )
 
 

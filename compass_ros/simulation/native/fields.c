@@ -9,8 +9,7 @@
 #include <stdint.h>
 #include <stddef.h>
 #include <string.h>
-#include <mujoco/mjdata.h>
-#include <mujoco/mjmodel.h>
+#include <mujoco/mujoco.h>
 
 enum { N_NUMBERS = 8, TABLE = 1 << 16 };
 
@@ -65,6 +64,9 @@ static const Program* find(const mjModel* model) {
     if (entries[slot].model == model) return entries[slot].program;
   return NULL;
 }
+
+// Whose structures these are: mj_version() of the MuJoCo whose headers this was compiled with.
+int compass_headers(void) { return mjVERSION_HEADER; }
 
 // How many kinds of force there are: a library that was compiled from another source has other ones. 0 without them.
 int compass_init(ApplyFT apply, FwdActuation actuation, Rne bias, SolveM solve) {
@@ -422,7 +424,8 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     s.way = -1, high[i] += evaluate(term, &s).x;
   }
   for (int i = 0; i < n; i++) {
-    double v = d->qvel[dofs[i]], stop = -d->qM[m->dof_Madr[dofs[i]]] * v / m->opt.timestep - load[dofs[i]];
+    int own = m->M_rowadr[dofs[i]] + m->M_rownnz[dofs[i]] - 1;   // the diagonal is the last of a row
+    double v = d->qvel[dofs[i]], stop = -d->M[own] * v / m->opt.timestep - load[dofs[i]];
     if (low[i] > high[i]) low[i] = high[i] = v > 0 ? low[i] : v < 0 ? high[i] : 0;   // less than none: along the motion
     limit[i] = stop < low[i] ? low[i] : stop > high[i] ? high[i] : NAN;   // not a number: held
   }

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from compass_ros.errors import ConfigError
+from compass_ros.simulation.native.compiled import compiled_forces
 from compass_ros.simulation.sites import DRIVES, JOINTS, PLANAR, Site
 from compass_ros.types import Floats
 
@@ -187,8 +188,7 @@ def save_numbers(spec: mujoco.MjSpec, model: mujoco.MjModel, path: Path) -> None
 @cache
 def _library() -> ctypes.PyDLL:
     """Load the compiled forces and install the callback, once a process. Models without a program do not notice it."""
-    folder = Path(__file__).parent
-    (path,) = folder.glob("_fields*.so")
+    path = compiled_forces()
     library = ctypes.PyDLL(str(path))  # keeps Python's lock: registering is not made for two threads at once
     library.compass_register.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
     library.compass_register.restype = ctypes.c_int
