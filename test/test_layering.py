@@ -46,6 +46,7 @@ LAYERS = {
     "places": 0,
     "config": 1,
     "progress": 1,
+    "executors": 1,
     **dict.fromkeys(STEPS, 2),
     **JOINS,
 }
@@ -55,6 +56,7 @@ HOMES = {
     ("mujoco", "robosuite"): {"simulation", "cells", "concealed"},
     ("torch",): {"calibration", "policy"},
     ("numba",): {"worlds"},
+    ("ray",): {"executors"},
     ("pysindy", "sklearn"): {"rivals"},
     ("cv2",): {"tracking"},
     ("rosbags", "mcap", "mcap_ros2"): {"episodes"},

@@ -8,9 +8,11 @@ import math
 import platform
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -20,17 +22,22 @@ from compass_ros.bench.outcome import append, case_of, outcome, read
 from compass_ros.bench.world import World, build
 from compass_ros.calibration.methods import compass_config, method
 from compass_ros.cells import load
+from compass_ros.executors import Executor
+from compass_ros.reporting.atomic import write_text
 from compass_ros.types import Estimate, Floats, Progress, Report, silent
 
 RESULTS = "results.jsonl"
 _PACKAGES = ("compass_ros", "mujoco", "numpy", "scipy", "torch", "sbi", "cma")
 
 
-def run_bench(cases: Sequence[Case], out: Path, report: Report = silent, threads: int = 0) -> int:
+def run_bench(
+    cases: Sequence[Case], out: Path, report: Report = silent, threads: int = 0, executor: Executor | None = None
+) -> int:
     """Run what `out/results.jsonl` does not have yet; returns how many cases ran.
 
     Interrupted runs go on where they were. `report` gets the share of the whole, the case as the stage, and its
-    method's gap; when it asks for a stop, the running case is dropped and nothing of it is written.
+    method's gap; when it asks for a stop, the running case is dropped and nothing of it is written. With an executor
+    it hears of whole cases alone, and those that run when it asks for a stop are dropped.
     """
     for case in cases:
         method(case.method)  # a wrong name ends before the first hour, not after it
@@ -38,24 +45,43 @@ def run_bench(cases: Sequence[Case], out: Path, report: Report = silent, threads
     path = out / RESULTS
     done = {case_of(row).key for row in read(path)}
     waiting = [case for case in cases if case.key not in done]
+    if executor is not None:
+        return _run_many(waiting, out, report, threads, executor)
     for i, case in enumerate(waiting):
         share = (len(cases) - len(waiting) + i) / len(cases)
         watcher = _Watcher(case, share, 1 / len(cases), report)
-        world = build(case, threads)
-        began = perf_counter()
-        estimate = run_case(case, world, watcher)
-        wall = perf_counter() - began
+        row = row_of(out, threads, case, watcher)
         if watcher.stopped:
             return i
-        effects = _effects(case, out, threads) if estimate.graph is not None else None
-        row = outcome(case, world, estimate, effects, wall)
-        row |= {
-            "time": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
-            "versions": versions(),
-        }
         append(path, row)
     report(Progress("bench", len(cases), 1.0, math.nan, math.nan))
     return len(waiting)
+
+
+def _run_many(waiting: Sequence[Case], out: Path, report: Report, threads: int, executor: Executor) -> int:
+    """Several at a time; the file has a line more after each."""
+    for done, (i, row) in enumerate(executor.each(partial(row_of, out, threads), waiting), 1):
+        append(out / RESULTS, row)
+        if not report(Progress(_title(waiting[i]), done, done / len(waiting), math.nan, math.nan)):
+            return done
+    return len(waiting)
+
+
+def row_of(out: Path, threads: int, case: Case, report: Report = silent) -> dict[str, Any]:
+    """A case's line of the results. `out` keeps the total effects of its task, on the machine that runs it."""
+    world = build(case, threads)
+    began = perf_counter()
+    estimate = run_case(case, world, report)
+    wall = perf_counter() - began
+    effects = _effects(case, out, threads) if estimate.graph is not None else None
+    return outcome(case, world, estimate, effects, wall) | {
+        "time": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
+        "versions": versions(),
+    }
+
+
+def _title(case: Case) -> str:
+    return f"{case.task} {case.method} seed {case.seed} {case.setting()}".strip()
 
 
 def run_case(case: Case, world: World, report: Report = silent) -> Estimate:
@@ -73,7 +99,7 @@ class _Watcher:
     """Scales a case's progress to the whole run and remembers a wish to stop."""
 
     def __init__(self, case: Case, base: float, share: float, report: Report) -> None:
-        self.title = f"{case.task} {case.method} seed {case.seed} {case.setting()}".strip()
+        self.title = _title(case)
         self.base, self.share, self.report = base, share, report
         self.stopped = False
 
@@ -96,7 +122,8 @@ def _effects(case: Case, out: Path, threads: int) -> Floats:
             return np.array(kept["total_effects"])
     effects = total_effects(build(reference, threads).problem)
     content = {"cell_hash": cell.hash, "parameters": names, "total_effects": np.round(effects, 6).tolist()}
-    path.write_text(json.dumps(content), encoding="utf-8")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_text(path, json.dumps(content))
     return np.round(effects, 6)
 
 

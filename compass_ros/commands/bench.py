@@ -54,6 +54,10 @@ def bench(
     ] = False,
     out: Annotated[Path, typer.Option(help="folder of results.jsonl and figures")] = Path("out/bench"),
     threads: Annotated[int, typer.Option(min=0, help="threads of the simulator; 0: all cores")] = 0,
+    jobs: Annotated[int, typer.Option(min=1, help="cases at a time, each in a process of its own")] = 1,
+    ray: Annotated[
+        str, typer.Option(help="on a ray cluster instead of this machine: auto, local, or the address of its head")
+    ] = "",
     table: Annotated[bool, typer.Option("--table", help="only print the tables of what is there")] = False,
     figures: Annotated[bool, typer.Option("--figures", help="only draw the figures of what is there")] = False,
     page: Annotated[Path | None, typer.Option(help="Markdown file whose tables are replaced")] = None,
@@ -61,6 +65,7 @@ def bench(
     """Run what is not there yet, one line of results.jsonl a case; a run that was stopped goes on where it was."""
     from compass_ros.bench.case import Case
     from compass_ros.bench.run import run_bench
+    from compass_ros.executors import executor
 
     varied = start is not Start.default or parameters is not Parameters.cell or (real, sim) != (10, 64)
     if ablations and (noise or missing or varied):
@@ -71,7 +76,8 @@ def bench(
         base = Case("", "", 0, iterations, real, sim, 0.0, missing, start.value, parameters=parameters.value)
         cases = chosen(task or ["air_hockey"], method or ["default"], seeds, noise or [0.0], base, ablations)
         with Bar() as bar:
-            ran = run_bench(cases, out, bar, threads)
+            many = executor(jobs, ray, max(threads, 1), computes=True) if ray or jobs > 1 else None
+            ran = run_bench(cases, out, bar, threads, many)
         typer.echo(f"{ran} cases run, {len(cases) - ran} were there already: {out}")
     _show(out, table or not figures, figures, page)
 

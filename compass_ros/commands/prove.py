@@ -29,6 +29,9 @@ def prove(
     out: Annotated[Path, typer.Option(help="results, one line a world")] = Path("proof/results.jsonl"),
     jobs: Annotated[int, typer.Option(min=1, help="worlds at a time")] = 1,
     threads: Annotated[int, typer.Option(min=1, help="threads of the simulator for each world")] = 1,
+    ray: Annotated[
+        str, typer.Option(help="on a ray cluster instead of this machine: auto, local, or the address of its head")
+    ] = "",
     method: Annotated[str, typer.Option(help="method of the calibration; others stand beside ours")] = "default",
     first_seed: Annotated[int | None, typer.Option(min=0, help="seed of the first world; else the suite's own")] = None,
     table: Annotated[bool, typer.Option("--table", help="only print the table of the results that are there")] = False,
@@ -38,6 +41,7 @@ def prove(
 ) -> None:
     """Conceal, calibrate blindly, unseal, count. A run that was stopped goes on where it was."""
     from compass_ros.errors import ConfigError, nearest
+    from compass_ros.executors import executor
     from compass_ros.proof import lines
     from compass_ros.proof.campaign import Plan, in_processes
     from compass_ros.proof.campaign import prove as campaign
@@ -48,18 +52,19 @@ def prove(
     for name in suites:
         if name not in SUITES:
             raise ConfigError(f"unknown suite '{name}'; known: {', '.join(SUITES)}{nearest(name, SUITES)}")
+    by = executor(jobs, ray, threads, computes=False)
     if rivals and not table:
         from compass_ros.proof import rivals as others
 
         plan = Plan(suites, worlds, others.METHOD, first_seed, others.PARTS)
-        campaign(plan, rivals_out, jobs, _tell_rivals, others.in_processes(threads))
+        campaign(plan, rivals_out, by, _tell_rivals, others.in_processes(threads))
     elif not table:
-        campaign(Plan(suites, worlds, method, first_seed), out, jobs, _tell, in_processes(threads))
+        campaign(Plan(suites, worlds, method, first_seed), out, by, _tell, in_processes(threads))
     found = list(lines.read(out).values())
     if not found and not rivals:
         raise ConfigError(f"{out}: no results; `compass prove` without --table makes them")
-    for (name, by), among in groups(found).items():
-        _print(f"{name}, method {by}: {lines.counted(among)}", among)
+    for (name, calibrator), among in groups(found).items():
+        _print(f"{name}, method {calibrator}: {lines.counted(among)}", among)
     foreign = [line for line in found if line["suite"] in FOREIGN]
     if foreign:
         _print(f"worlds from other engines, all scenes: {lines.counted(foreign)}", foreign)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
+from compass_ros.executors import Executor
 from compass_ros.proof import lines
 from compass_ros.proof.lines import Key, Line
 from compass_ros.proof.one_world import SUITES, run
@@ -38,11 +39,15 @@ class Plan:
 
 def in_processes(threads: int) -> RunWorld:
     """A world by the real command line."""
-    return lambda key: run(SUITES[key.suite], key.seed, key.method, threads) | {"threads": threads}
+    return partial(_in_process, threads)
 
 
-def prove(plan: Plan, path: Path, jobs: int, tell: Tell, run_world: RunWorld) -> None:
-    """Run what is missing or by an older method, `jobs` worlds at a time; the file is whole after each of them."""
+def _in_process(threads: int, key: Key) -> dict[str, object]:
+    return run(SUITES[key.suite], key.seed, key.method, threads) | {"threads": threads}
+
+
+def prove(plan: Plan, path: Path, executor: Executor, tell: Tell, run_world: RunWorld) -> None:
+    """Run what is missing or by an older method; the file is whole after each world."""
     known = lines.read(path)
     made_by = {
         "method_sources": lines.sources(lines.METHOD if plan.parts is None else plan.parts),
@@ -54,17 +59,12 @@ def prove(plan: Plan, path: Path, jobs: int, tell: Tell, run_world: RunWorld) ->
         for key in plan.worlds_to_prove()
         if lines.stale(known.get(key), str(made_by["method_sources"]), str(made_by["world_sources"]))
     ]
-    with ThreadPoolExecutor(jobs) as pool:
-        running: dict[Future[dict[str, object]], Key] = {pool.submit(run_world, key): key for key in todo}
-        try:
-            for done, future in enumerate(as_completed(running), 1):
-                key = running[future]
-                about = {"suite": key.suite, "seed": key.seed, "method": key.method, "jobs": jobs}
-                known[key] = about | made_by | future.result()
-                lines.write(path, known.values())
-                tell(key, known[key], done, len(todo))
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+    for done, (i, said) in enumerate(executor.each(run_world, todo), 1):
+        key = todo[i]
+        about = {"suite": key.suite, "seed": key.seed, "method": key.method, "jobs": executor.jobs}
+        known[key] = about | made_by | said
+        lines.write(path, known.values())
+        tell(key, known[key], done, len(todo))
 
 
 def commit() -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from compass_ros.concealed.comparison import judge_names
 from compass_ros.concealed.seal import unseal
 from compass_ros.proof.campaign import RunWorld
+from compass_ros.proof.lines import Key
 from compass_ros.proof.one_world import SUITES, Suite, concealed
 
 METHOD = "rivals"
@@ -31,7 +33,11 @@ PARTS = (
 
 def in_processes(threads: int) -> RunWorld:
     """A world by the real command line."""
-    return lambda key: run(SUITES[key.suite], key.seed, threads)
+    return partial(_in_process, threads)
+
+
+def _in_process(threads: int, key: Key) -> dict[str, object]:
+    return run(SUITES[key.suite], key.seed, threads)
 
 
 def run(suite: Suite, seed: int, threads: int, rivals: Sequence[str] = ()) -> dict[str, object]:

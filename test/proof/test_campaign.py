@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from compass_ros.errors import ConfigError
+from compass_ros.executors import Threads
 from compass_ros.proof import campaign, lines
 from compass_ros.proof.campaign import Plan, prove
 from compass_ros.proof.lines import Key
@@ -65,9 +66,9 @@ def quiet(*_: object) -> None: ...
 def test_a_stopped_run_goes_on_where_it_was(tmp_path: Path) -> None:
     path, first, second = tmp_path / "proof" / "results.jsonl", Runner(stop_after=2), Runner()
     with pytest.raises(KeyboardInterrupt):
-        prove(PLAN, path, 1, quiet, first)
+        prove(PLAN, path, Threads(1), quiet, first)
     assert sorted(key.seed for key in lines.read(path)) == first.seeds == SEEDS[:2]
-    prove(PLAN, path, 1, quiet, second)
+    prove(PLAN, path, Threads(1), quiet, second)
     assert second.seeds == SEEDS[2:]
     assert [json.loads(line)["seed"] for line in path.read_text().splitlines()] == SEEDS
 
@@ -75,11 +76,11 @@ def test_a_stopped_run_goes_on_where_it_was(tmp_path: Path) -> None:
 @pytest.mark.parametrize("what", ["METHOD", "WORLDS"])
 def test_worlds_of_an_older_method_are_run_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str) -> None:
     path, again, done = tmp_path / "results.jsonl", Runner(), Runner()
-    prove(PLAN, path, 2, quiet, Runner())
-    prove(PLAN, path, 1, quiet, done)
+    prove(PLAN, path, Threads(2), quiet, Runner())
+    prove(PLAN, path, Threads(1), quiet, done)
     assert done.seeds == []
     monkeypatch.setattr(lines, what, ("errors.py",))
-    prove(PLAN, path, 1, quiet, again)
+    prove(PLAN, path, Threads(1), quiet, again)
     assert again.seeds == SEEDS
     assert len(lines.read(path)) == 3
 
@@ -87,16 +88,16 @@ def test_worlds_of_an_older_method_are_run_again(tmp_path: Path, monkeypatch: py
 def test_a_run_that_failed_is_kept_counted_and_tried_again(tmp_path: Path) -> None:
     path, again = tmp_path / "results.jsonl", Runner()
     failed = {"error": "calibrate: status 1: no", "kind": "one", "truth": ["swirl"]}
-    prove(Plan(("main",), 1), path, 1, quiet, lambda key: dict(failed))
+    prove(Plan(("main",), 1), path, Threads(1), quiet, lambda key: dict(failed))
     (line,) = lines.read(path).values()
     assert table([line])[0].count == "0 of 1"
-    prove(Plan(("main",), 1), path, 1, quiet, again)
+    prove(Plan(("main",), 1), path, Threads(1), quiet, again)
     assert again.seeds == SEEDS[:1]
 
 
 def test_a_line_says_what_made_it(tmp_path: Path) -> None:
     path = tmp_path / "results.jsonl"
-    prove(Plan(("small",), 1, method="compass", first_seed=7), path, 1, quiet, Runner())
+    prove(Plan(("small",), 1, method="compass", first_seed=7), path, Threads(1), quiet, Runner())
     (line,) = lines.read(path).values()
     assert (line["suite"], line["seed"], line["method"], line["jobs"]) == ("small", 7, "compass", 1)
     assert line["method_sources"] == lines.sources(lines.METHOD)
@@ -106,7 +107,7 @@ def test_a_line_says_what_made_it(tmp_path: Path) -> None:
 def test_methods_stand_beside_each_other(tmp_path: Path) -> None:
     path = tmp_path / "results.jsonl"
     for method in ("default", "compass"):
-        prove(Plan(("main",), 1, method=method), path, 1, quiet, Runner())
+        prove(Plan(("main",), 1, method=method), path, Threads(1), quiet, Runner())
     assert len(lines.read(path)) == 2
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from compass_ros.executors import Threads
 from compass_ros.proof import rivals
 from compass_ros.proof.campaign import Plan, prove
 from compass_ros.proof.lines import read
@@ -106,11 +107,11 @@ def test_worlds_are_run_again_when_the_rivals_change(tmp_path: Path, monkeypatch
     def plan() -> Plan:
         return Plan(("main",), 2, rivals.METHOD, 5, rivals.PARTS)
 
-    prove(plan(), path, 1, lambda *_: None, run)
-    prove(plan(), path, 1, lambda *_: None, run)
+    prove(plan(), path, Threads(1), lambda *_: None, run)
+    prove(plan(), path, Threads(1), lambda *_: None, run)
     assert done == [5, 6]
     monkeypatch.setattr(rivals, "PARTS", ("errors.py",))
-    prove(plan(), path, 1, lambda *_: None, run)
+    prove(plan(), path, Threads(1), lambda *_: None, run)
     assert done == [5, 6, 5, 6]
     assert len(read(path)) == 2
 
