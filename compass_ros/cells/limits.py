@@ -35,6 +35,6 @@ def limits(cell: Cell, model: mujoco.MjModel) -> Mapping[str, tuple[Limits, ...]
 
 def _of_joint(model: mujoco.MjModel, name: str) -> Limits:
     joint = model.joint(name)
-    hinge = joint.type[0] in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_BALL)
+    hinge = int(joint.type[0]) in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_BALL)
     low, high = joint.range if model.jnt_limited[joint.id] else (-np.inf, np.inf)
     return Limits("angle" if hinge else "length", float(low), float(high))

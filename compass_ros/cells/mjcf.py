@@ -54,8 +54,10 @@ class Mjcf:
 
     def apply(self, models: Sequence[mujoco.MjModel], values: Floats) -> None:
         for model in models:
-            model.tendon_lengthspring[self._rests_as_drawn] = -1  # mj_setConst measures it, in the scene as it is tuned
+            model.tendon_lengthspring[self._rests_as_drawn] = -1
         self._fields.write(models, values)
+        for model in models if len(self._rests_as_drawn) else ():
+            _measure_rests(model)
 
     @property
     def first(self) -> Floats:
@@ -108,6 +110,19 @@ class Mjcf:
 
     def poses(self, values: Floats, positions: Floats) -> Mapping[str, Floats]:
         return {}  # which bodies move in a plane is not known here
+
+
+def _measure_rests(model: mujoco.MjModel) -> None:
+    """Springs of tendons that nobody gave a rest: it is their length in the scene as it is tuned.
+
+    `mj_setConst` did that until MuJoCo 3.16.
+    """
+    open_ = (model.tendon_lengthspring == -1).all(axis=1)
+    if open_.any():
+        drawn = mujoco.MjData(model)
+        drawn.qpos[:] = model.qpos_spring
+        mujoco.mj_fwdPosition(model, drawn)
+        model.tendon_lengthspring[open_] = drawn.ten_length[open_, None]
 
 
 def _starts(cell: Cell, model: mujoco.MjModel) -> dict[str, Start]:

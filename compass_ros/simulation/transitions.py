@@ -39,7 +39,7 @@ class Chart:
         position, axis = np.zeros(model.nv, int), np.full(model.nv, -1)
         for joint in range(model.njnt):
             at, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
-            kind = model.jnt_type[joint]
+            kind = int(model.jnt_type[joint])  # MuJoCo 4: no number of numpy is `in` a tuple of its constants
             free = kind == mujoco.mjtJoint.mjJNT_FREE
             shifts = 3 if free else 0 if kind == mujoco.mjtJoint.mjJNT_BALL else 1
             position[dof : dof + shifts] = at + np.arange(shifts)

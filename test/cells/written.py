@@ -68,6 +68,9 @@ SERVO = """
 </mujoco>
 """
 
+DERIVED = {"geom_aabb", "geom_sameframe", "body_sameframe", "bvh_aabb"} if mujoco.mj_version() > 3_010_000 else set()
+"""Arrays for shortcuts and the broad phase, which `mj_setConst` computes since MuJoCo 3.11."""
+
 
 def parameter(name: str, field: str, of: str = "", default: float = 0.0, width: float = 1.0) -> dict[str, object]:
     """A parameter whose bounds are ten half widths away."""
