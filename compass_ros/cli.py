@@ -17,6 +17,7 @@ from compass_ros.commands import (
     demo,
     diagnose,
     evaluate,
+    export,
     init,
     plan,
     policy,
@@ -37,7 +38,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for module in (demo, init, plan, track, record, check, calibrate, evaluate, diagnose, report, policy):
+for module in (demo, init, plan, track, record, check, calibrate, evaluate, diagnose, report, export, policy):
     module.add_to(app)
 for module in (conceal, unseal, prove, rivals, bench, real, tables):
     module.add_to(app)

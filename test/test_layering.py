@@ -21,6 +21,7 @@ JOINS = {
     "results": 3,
     "operation": 3,
     "planning": 4,
+    "targets": 4,
     "concealed": 3,
     "worlds": 2,
     "assembly": 4,
@@ -53,7 +54,7 @@ LAYERS = {
 """A module imports from lower layers, or from its own part."""
 
 HOMES = {
-    ("mujoco", "robosuite"): {"simulation", "cells", "concealed"},
+    ("mujoco", "robosuite"): {"simulation", "cells", "concealed", "targets"},
     ("torch",): {"calibration", "policy"},
     ("numba",): {"worlds"},
     ("ray",): {"executors"},

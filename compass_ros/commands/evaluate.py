@@ -33,7 +33,7 @@ def evaluate(
 
     folder = result.parent if result.name == "result.json" else result
     content = read_result(folder / "result.json")
-    loaded = load(cell or _cell_of(folder, content))
+    loaded = load(cell or cell_of(folder, content))
     reading = read_usable(loaded, bags)
     said = judge(loaded, folder, reading.episodes, threads)
     left_out = (*reading.left_out, *said.left_out)
@@ -43,7 +43,7 @@ def evaluate(
         typer.echo(f"note: {one}", err=True)
 
 
-def _cell_of(folder: Path, content: dict[str, Any]) -> str:
+def cell_of(folder: Path, content: dict[str, Any]) -> str:
     """Where the result says that its cell is: one of the suite's own by its name. Raises ConfigError."""
     from compass_ros.errors import ConfigError
 

@@ -1,0 +1,1 @@
+"""Results that travel: what was found, in the words of other simulators."""

@@ -1,0 +1,185 @@
+"""A calibrated scene with its laws as plain MJCF, as far as MJCF has words for them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from compass_ros.simulation.effects import Exported, FittedEffect
+from compass_ros.targets.said import Said
+
+
+@dataclass(frozen=True)
+class Delayed:
+    """A command that acts late, and what is added to it: parameters of a cell's input, no fields of a model."""
+
+    actuator: str
+    delay_s: float = 0.0
+    offset: float = 0.0
+    """[unit of the command]"""
+
+
+def write_plain(scene: Path, exported: Exported, delays: Sequence[Delayed], out: Path) -> tuple[Said, ...]:
+    """Read a written scene, add what MJCF can say, write it. Files of the scene are named as `scene` names them."""
+    spec = mujoco.MjSpec.from_file(str(scene))
+    said = [Said(f"friction of the table under {name}", (), "left out", "compass_ros.simulation.effects.attach has it")
+            for name in exported.sliding]  # fmt: skip
+    for fitted in exported.effects:
+        name, on = fitted.attached.effect.name, fitted.attached.objects
+        write = _WRITERS.get(name)
+        if write is None:
+            said.append(Said(name, on, "left out", "MJCF has no word for it; attach() plays it"))
+        else:
+            said.append(write(spec, fitted))
+    for one in delays:
+        said += _late(spec, one)
+    spec.compile()
+    out.write_text(spec.to_xml(), encoding="utf-8")
+    return tuple(said)
+
+
+def numbers(fitted: FittedEffect) -> Mapping[str, float]:
+    """Values by name."""
+    names = (q.name for q in fitted.attached.effect.quantities)
+    return dict(zip(names, fitted.values, strict=True))
+
+
+def _joints(spec: mujoco.MjSpec, fitted: FittedEffect) -> list[mujoco.MjsJoint]:
+    return [joint for joint in (spec.joint(name) for name in fitted.attached.objects) if joint is not None]
+
+
+def _no_joint(fitted: FittedEffect) -> Said:
+    what = "on a body: MJCF knows it on joints alone"
+    return Said(fitted.attached.effect.name, fitted.attached.objects, "left out", what)
+
+
+def _friction(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
+    joints = _joints(spec, fitted)
+    if not joints:
+        return _no_joint(fitted)
+    for joint in joints:
+        joint.frictionloss += numbers(fitted)["coefficient"]
+    return Said("coulomb_friction", fitted.attached.objects, "alike", "frictionloss is soft: what it holds creeps")
+
+
+def _viscous(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
+    joints = _joints(spec, fitted)
+    if not joints:
+        return _no_joint(fitted)
+    for joint in joints:
+        damping = np.array(joint.damping, dtype=float)
+        damping[0] += numbers(fitted)["rate"]
+        joint.damping = damping
+    return Said("viscous_drag", fitted.attached.objects, "alike", "damping is integrated implicitly")
+
+
+def _spring(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
+    joints, given = _joints(spec, fitted), numbers(fitted)
+    if not joints:
+        return _no_joint(fitted)
+    for joint in joints:
+        stiffness = np.array(joint.stiffness, dtype=float)
+        own, added = float(stiffness.flat[0]), given["stiffness"]
+        if own + added > 0:
+            turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE and spec.compiler.degree
+            rest = math.degrees(given["rest"]) if turns else given["rest"]
+            joint.springref = (own * joint.springref + added * rest) / (own + added)
+        stiffness.flat[0] = own + added
+        joint.stiffness = stiffness if stiffness.ndim else float(stiffness)
+    soft = given.get("softening", 0.0)
+    if soft:
+        return Said("spring", fitted.attached.objects, "alike", f"linear: near its rest; its softening is {soft:.3g}")
+    return Said("spring", fitted.attached.objects, "exact")
+
+
+def _tilt(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
+    """All bodies feel it, or MJCF cannot say it."""
+    model, given = spec.compile(), numbers(fitted)
+    moving = {model.body(b).name for b in range(1, model.nbody) if model.body_weldid[b]}
+    gravity = np.array(spec.option.gravity, dtype=float)
+    down = np.array([0.0, 0.0, -1.0])
+    if moving - set(fitted.attached.objects) or not np.allclose(gravity / np.linalg.norm(gravity), down):
+        why = "some bodies do not feel it, or gravity is not along z"
+        return Said("gravity_tilt", fitted.attached.objects, "left out", why)
+    size, x, y = float(np.linalg.norm(gravity)), given["tilt_x"], given["tilt_y"]
+    angle = math.hypot(x, y)
+    across = np.array([x, y, 0.0]) / angle if angle else np.zeros(3)
+    spec.option.gravity = size * (math.cos(angle) * down + math.sin(angle) * across)
+    return Said("gravity_tilt", fitted.attached.objects, "exact")
+
+
+def _payload(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
+    given, model = numbers(fitted), spec.compile()
+    for name in fitted.attached.objects:
+        body, compiled = spec.body(name), model.body(name)
+        place = np.array(compiled.ipos) + [given.get(axis, 0.0) for axis in "xyz"]
+        load = body.add_body(name=f"{name}_payload", pos=place)
+        load.mass, load.ipos, load.inertia = given["mass"], np.zeros(3), np.full(3, _POINT)
+        load.explicitinertial = True
+    return Said("payload", fitted.attached.objects, "exact")
+
+
+def _gain(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
+    for name in fitted.attached.objects:
+        gains = np.array(spec.actuator(name).gainprm, dtype=float)
+        gains[0] *= 1 + numbers(fitted)["error"]
+        spec.actuator(name).gainprm = gains
+    return Said("gain_error", fitted.attached.objects, "exact", "where no limit of the command is reached")
+
+
+def _lag(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
+    for name in fitted.attached.objects:
+        actuator = spec.actuator(name)
+        if actuator.dyntype != mujoco.mjtDyn.mjDYN_NONE:
+            return Said("first_order_lag", fitted.attached.objects, "left out", f"{name} has dynamics of its own")
+        actuator.dyntype, actuator.actearly = mujoco.mjtDyn.mjDYN_FILTEREXACT, True
+        parameters = np.array(actuator.dynprm, dtype=float)
+        parameters[0] = numbers(fitted)["time"]
+        actuator.dynprm = parameters
+    return Said("first_order_lag", fitted.attached.objects, "exact", "set `act` to the first command")
+
+
+def _delay(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
+    for name in fitted.attached.objects:
+        _set_delay(spec, spec.actuator(name), numbers(fitted)["delay"])
+    return Said("actuation_delay", fitted.attached.objects, "exact", "after the first delay")
+
+
+def _set_delay(spec: mujoco.MjSpec, actuator: mujoco.MjsActuator, delay_s: float) -> None:
+    """MuJoCo keeps so many commands, and interpolates linearly between them."""
+    actuator.delay = delay_s
+    actuator.nsample = math.ceil(delay_s / spec.option.timestep) + 2
+    actuator.interp = 1
+
+
+def _late(spec: mujoco.MjSpec, given: Delayed) -> list[Said]:
+    """The delay of a cell's input, and what is added to its command."""
+    actuator, said = spec.actuator(given.actuator), []
+    if given.delay_s > 0:
+        _set_delay(spec, actuator, given.delay_s)
+        said.append(Said("delay of the command", (given.actuator,), "alike", "commands once a step, interpolated"))
+    if given.offset:
+        bias = np.array(actuator.biasprm, dtype=float)
+        bias[0] += float(np.array(actuator.gainprm)[0]) * given.offset
+        actuator.biasprm = bias
+        said.append(Said("offset of the command", (given.actuator,), "exact"))
+    return said
+
+
+_POINT = 1e-9
+"""[kg m^2] Inertia of a point mass: MuJoCo wants some."""
+_WRITERS: Mapping[str, Callable[[mujoco.MjSpec, FittedEffect], Said]] = {
+    "actuation_delay": _delay,
+    "coulomb_friction": _friction,
+    "first_order_lag": _lag,
+    "gain_error": _gain,
+    "gravity_tilt": _tilt,
+    "payload": _payload,
+    "spring": _spring,
+    "viscous_drag": _viscous,
+}
