@@ -30,8 +30,10 @@ ATTEMPTS = 3
 class Executor(Protocol):
     """Runs a task on many items."""
 
-    jobs: int
-    """Items at a time."""
+    @property
+    def jobs(self) -> int:
+        """Items at a time."""
+        ...
 
     def each(self, task: Callable[[Item], Answer], items: Sequence[Item]) -> Iterator[tuple[int, Answer]]:
         """(place among the items, answer), in the order in which they end."""

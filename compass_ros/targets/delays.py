@@ -27,8 +27,8 @@ def delays_of(cell: Cell, values: Mapping[str, float]) -> tuple[Delayed, ...]:
         for target in targets if found[2] is None else targets[int(found[2]) : int(found[2]) + 1]:
             to[target] = values[parameter.name]
     names = dict.fromkeys([*late, *shifted])
-    found = (Delayed(name, late.get(name, 0.0), shifted.get(name, 0.0)) for name in names)
-    return tuple(one for one in found if one.delay_s or one.offset)
+    listed = (Delayed(name, late.get(name, 0.0), shifted.get(name, 0.0)) for name in names)
+    return tuple(one for one in listed if one.delay_s or one.offset)
 
 
 def _fixed(inputs: Iterable[InputSpec], what: str) -> dict[str, float]:

@@ -64,7 +64,7 @@ def test_a_lost_node_loses_nothing(cluster: Any) -> None:
     """The second node ends while it works; what it had goes to the first."""
     other = cluster.add_node(**NODE, **ports())
     cluster.wait_for_nodes()
-    answers = []
+    answers: list[int] = []
     for _, (number, _) in Ray(cluster.address).each(where, range(6)):
         if not answers:
             cluster.remove_node(other, allow_graceful=False)

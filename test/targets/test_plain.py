@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compass_ros.simulation.effects import Attached, Exported, FittedEffect, attach, effect
-from compass_ros.simulation.extents import unit_joint
+from compass_ros.simulation.sizes import unit_joint
 from compass_ros.targets.plain_mjcf import Delayed, write_plain
 from compass_ros.types import Floats
 
