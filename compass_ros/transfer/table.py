@@ -19,7 +19,7 @@ from compass_ros.types import Floats
 
 HEADER = (
     *("simulator", "difference min, max, mean [m]", "of nominal", "policies", "last distance [m]", "success of 10"),
-    *("success of 100", "promised in its own simulator", "trained in [s]"),
+    *("success of 100", "promised in its own simulator", "trained in [s of processor]"),
 )
 SHOWN = ("nominal", "npdr", "compass", "parameters", "laws", "itself")
 
@@ -46,7 +46,7 @@ def _line(name: str, rows: Sequence[Row]) -> list[str] | None:
         "-" if gap is None or nominal is None else f"{gap[2] / nominal[2]:.2f}",
         str(len(policies)),
         *(_spread([_number(r, field) for r in policies]) for field in ("distance_m", "success", "success_100")),
-        *(_spread([_number(r, field) for r in policies]) for field in ("promised", "trained_s")),
+        *(_spread([_number(r, field) for r in policies if field in r]) for field in ("promised", "trained_cpu_s")),
     ]
 
 
