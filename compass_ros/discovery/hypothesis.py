@@ -133,8 +133,8 @@ class Hypothesis:
         """(P + Q, n) a square root of the covariance of parameters and laws by the noise; none along the others."""
         free = self.fit.free
         root = np.zeros((len(self.fit.point.values), len(free)))
-        of_free = np.linalg.cholesky(covariance(self.likelihood, self.fit)[: len(free), : len(free)])
-        root[free] = of_free * self.likelihood.prior_std[free][:, None]
+        size, axes = np.linalg.eigh(covariance(self.likelihood, self.fit)[: len(free), : len(free)])
+        root[free] = axes * np.sqrt(np.maximum(size, 0.0)) * self.likelihood.prior_std[free][:, None]
         return root
 
     def own(self) -> Iterator[tuple[Attached, slice]]:
