@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from compass_ros.checks.finding import Finding, told
-from compass_ros.checks.series import Level, Series
+from compass_ros.checks.series import SIGMAS, Level, Series
 from compass_ros.types import Bools, Floats, Ints, Track
 
 SHORTEST = 3
@@ -96,11 +96,12 @@ def _caught_up(one: Series, run: tuple[int, int], level: Level) -> bool:
     first, last = run
     if first < 2 or last + 3 >= len(one.value):
         return False
-    jump = (one.value[last + 1] - one.value[last]) / level.apart
+    apart = np.maximum(level.apart, SIGMAS * level.step)  # a joint that sticks and slips does so by some steps
+    jump = (one.value[last + 1] - one.value[last]) / apart
     if np.linalg.norm(jump) < VISIBLE:
         return False
     around = slice(first - 2, last + 4)
-    scaled, time = one.value[around] / level.apart, (one.stamp_ns[around] - one.stamp_ns[first]) * 1e-9
+    scaled, time = one.value[around] / apart, (one.stamp_ns[around] - one.stamp_ns[first]) * 1e-9
     first, last = 2, last - first + 2
     speed = np.diff(scaled[[first - 2, first - 1, first]], axis=0) / np.diff(time[first - 2 : first + 1])[:, None]
     later = np.diff(scaled[last + 1 : last + 4], axis=0) / np.diff(time[last + 1 : last + 4])[:, None]

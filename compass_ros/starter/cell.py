@@ -83,7 +83,7 @@ def _head(out: Path, scene: Path, model: Path, recordings: Recordings, remarks: 
     for remark in remarks:
         lines += comment(f"Note: {remark}")
     relative = os.path.relpath(scene, out.parent)
-    return [*lines, f"name: {plain(out.stem)}", "dynamics: mjcf", f"model: {plain(relative)}"]
+    return [*lines, f"name: {plain(recordings.cell or out.stem)}", "dynamics: mjcf", f"model: {plain(relative)}"]
 
 
 def _series(found: Found, used: Robot, recordings: Recordings) -> Iterator[str]:

@@ -70,6 +70,8 @@ class Recordings:
     """Length of each recording that was looked at."""
     notes: tuple[str, ...]
     """What could not be read, and why."""
+    cell: str = ""
+    """Whose recordings the first of them says that they are; empty where it says nothing."""
 
 
 def read_all(paths: Iterable[str | Path]) -> Recordings:
@@ -87,7 +89,8 @@ def read_all(paths: Iterable[str | Path]) -> Recordings:
             found[held].append(track)
         notes += said
     whole = tuple(Series(held, tuple(tracks)) for held, tracks in found.items() if len(tracks) == len(bags))
-    return Recordings(tuple(bags), len(every), whole, tuple(_seconds(whole, i) for i in range(len(bags))), tuple(notes))
+    seconds = tuple(_seconds(whole, i) for i in range(len(bags)))
+    return Recordings(tuple(bags), len(every), whole, seconds, tuple(notes), read_bag(bags[0], ()).episode.cell)
 
 
 def _in_all(surveys: Sequence[Sequence[Held]]) -> tuple[list[Held], list[str]]:

@@ -73,11 +73,11 @@ def stamps(time: Floats, seed: int) -> Ints:
     return np.asarray(START_NS + seed * 10**12 + np.round(time * 1e9).astype(np.int64))
 
 
-def record(folder: Path, seed: int, tracks: Sequence[tuple[Track, Source]]) -> None:
-    """A bag with these series."""
+def record(folder: Path, seed: int, tracks: Sequence[tuple[Track, Source]], cell: str = "") -> None:
+    """A bag with these series, which may say whose it is."""
     signals, inputs = ([t for t, s in tracks if s.drives == drives] for drives in (False, True))
     first = int(tracks[0][0].stamp_ns[0])
-    said = Episode(f"run{seed}", "", "", {}, first, tuple(signals), inputs=tuple(inputs))
+    said = Episode(f"run{seed}", cell, "", {}, first, tuple(signals), inputs=tuple(inputs))
     write_episode(said, folder, [s for _, s in tracks])
 
 

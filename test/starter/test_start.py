@@ -170,6 +170,19 @@ def test_without_a_command_measured_torques_drive(tmp_path: Path) -> None:
     assert read_episodes([tmp_path / "bags"], sources(cell), cell.name)[0].inputs[0].value.shape[1] == 2
 
 
+def test_it_is_the_cell_whose_recordings_they_are(tmp_path: Path) -> None:
+    """A cell of another name would refuse them."""
+    (tmp_path / "arm.xml").write_text(mjcf())
+    time, target, got = moved(0, SECONDS)
+    stamp = stamps(time, 0)
+    tracks = [state("a", "/joint_states", [*SAME], stamp, got), state("b", "/joint_commands", [*SAME], stamp, target)]
+    record(tmp_path / "bags", 0, tracks, "bench2")
+    start(tmp_path / "arm.xml", [tmp_path / "bags"], tmp_path / "mine.yaml")
+    cell = load(tmp_path / "mine.yaml")
+    assert cell.name == "bench2"
+    assert len(read_episodes([tmp_path / "bags"], sources(cell), cell.name)) == 1
+
+
 def test_nothing_in_common_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "arm.xml").write_text(mjcf("rotation", "pitch"))
     jointed(["shoulder", "patch"])(tmp_path / "bags", 0, *moved(0, 3.0))
