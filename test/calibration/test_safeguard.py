@@ -106,7 +106,7 @@ def chaotic(seed: int) -> Likelihood:
 FARTHER: dict[str, Callable[[], Likelihood]] = {
     "beginnings that mislead": misled,
     "few amplified frames against many": few_against_many,
-    "the same with launches that scatter": lambda: few_against_many(0.02),
+    "the same with launches that scatter": lambda: few_against_many(1e-4),
     "an exact sensor against a coarse one": exact_against_coarse,
     "lost frames on one side": lambda: replace(
         few_against_many(),
