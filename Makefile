@@ -10,6 +10,7 @@
 #   make cells   200 cells drawn at random, recorded and calibrated: results, one-line refusals, tracebacks
 #   make mutate  changes each number that decides a verdict and asks whether a test fails; a nightly job
 #   make bench   the benchmark of methods (docs/benchmarks.md); goes on where it was stopped
+#   make site    the documentation as a site, in out/site
 #   make wheel   what `pip install` takes, in dist/; make engines: old and new MuJoCo and numpy; make ray: a small cluster
 #   make lint | readers | bags | lock | clean
 #
@@ -30,6 +31,7 @@ NATIVE := $(wildcard compass_ros/simulation/native/*.[ch])
 # Others' readers, to which the tests give our bags: Foxglove's, for Node, and Rerun's, whose numpy is not ours.
 READERS := test/readers
 RERUN   := .venv-rerun
+SITE    := .venv-site
 
 .PHONY: demo prove real league test lint bench bags readers install interfaces lock clean soak fuzz cells mutate ray engines wheel site
 .DELETE_ON_ERROR:
@@ -65,6 +67,15 @@ $(READERS)/node_modules/.package-lock.json: $(READERS)/package-lock.json
 $(RERUN)/.installed: $(READERS)/requirements.txt
 	$(PYTHON) -m venv $(RERUN)
 	$(RERUN)/bin/python -m pip install --quiet --disable-pip-version-check -r $<
+	@touch $@
+
+# The documentation as a site in out/site; once its environment is there, no network is needed.
+site: $(SITE)/.installed
+	NO_MKDOCS_2_WARNING=1 $(SITE)/bin/python -m mkdocs build --strict $(ARGS)
+
+$(SITE)/.installed: docs/requirements.txt
+	$(PYTHON) -m venv $(SITE)
+	$(SITE)/bin/python -m pip install --quiet --disable-pip-version-check -r $<
 	@touch $@
 
 lint: install
@@ -124,6 +135,6 @@ lock:
 	$(BIN)/python scripts/lock.py > requirements.lock
 
 clean:
-	rm -rf $(VENV) .venv-ray .venv-build $(RERUN) $(READERS)/node_modules build install log out .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
+	rm -rf $(VENV) .venv-ray .venv-build $(RERUN) $(SITE) $(READERS)/node_modules build install log out .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
 	rm -f compass_ros/simulation/native/*.so
 	find compass_ros test scripts examples -name __pycache__ -type d -prune -exec rm -rf {} +
