@@ -585,7 +585,7 @@ def gallery() -> str:
         for name, law in EFFECTS.items():
             if law.channel == channel:
                 seen, picture = PICTURES[name].seen, f"![{name}](images/laws/{name}.svg)"
-                lines.append(f"| `{name}` | {law.sentence} | {picture} | {seen} |")
+                lines.append(f"| `{name}`:<br>{law.sentence} | {picture} | {seen} |")
         lines.append("")
     return "\n".join(lines)
 

@@ -62,7 +62,7 @@ def test_links_to_the_two_pages_of_the_root_lead_there_in_the_site() -> None:
 
 def test_nothing_is_loaded_from_elsewhere_and_every_tool_is_pinned() -> None:
     assert SITE["theme"]["font"] is False
-    assert "extra_css" not in SITE
+    assert all((DOCS / sheet).is_file() for sheet in SITE["extra_css"])
     assert "extra_javascript" not in SITE
     for path in DOCUMENTS:
         assert (
