@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from compass_ros.calibration.cost import Point, start
 from compass_ros.calibration.identifiability import IDENTIFIED, together
-from compass_ros.calibration.least_squares import Point, start
 from compass_ros.calibration.problem import Allowance, Problem
 from compass_ros.calibration.refine import COARSE, Refined, refine, standard_errors
 from compass_ros.calibration.safeguard import farther, no_farther

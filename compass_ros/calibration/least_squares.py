@@ -1,60 +1,25 @@
 """Maximum a posteriori by Levenberg-Marquardt, with finite differences taken in one batch of rollouts.
 
-Source: Nocedal and Wright 2006, chapter 10; robust weights after Huber in the smooth form of Charbonnier,
-rho(r) = 2 c^2 (sqrt(1 + r^2 / c^2) - 1), by iteratively reweighted least squares.
+Source: Nocedal and Wright 2006, chapter 10.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from compass_ros.calibration.cost import Point, cost, robust_weight
+from compass_ros.calibration.differences import FIRST_STEP, Linear, broyden, difference_steps, linearise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.types import Bools, Floats, Ints
 
-FIRST_STEP = 0.02
-"""First finite differences, in standard deviations of the prior."""
-MARGIN_S = 0.1
-"""How much earlier than at a point nearby a parameter may begin to act [s]."""
-_TRIALS = ((1.0,), (0.01, 100.0))
-"""Damping factors, relative to the current one: those of a group are tried at once, the second group where the first
-does not do what the linear model hopes for."""
+_OTHERS = (0.01, 100.0)
+"""Damping factors, relative to the current one, that are tried where that one does not do what it should."""
 _AS_HOPED, _EASIER = 0.9, 0.1
 """Share of the hoped fall of the cost from which a step is as good as any, and factor of the damping after such a one;
 where the linear model holds, damping only shortens the step."""
-
-
-@dataclass(frozen=True)
-class Point:
-    """Where a fit stands."""
-
-    values: Floats
-    """(P,) parameters."""
-    launch: Floats
-    """(E, A) offsets of the inputs."""
-    cost: float
-    """Half the robust sum of squares plus half the prior's; infinite before it was evaluated."""
-
-
-@dataclass(frozen=True)
-class Linear:
-    """The model linearised at a point. n = free parameters + launches."""
-
-    residual: Floats
-    """(E, F, C) in sigma."""
-    jacobian: Floats
-    """(E, F, C, p) change of the residual per prior standard deviation of each free parameter."""
-    launch_jacobian: Floats
-    """(E, F, C, l) change of the episode's own residual per standard deviation of its launch."""
-    onset: Floats
-    """(E, p) simulated time up to which a parameter did nothing in an episode [s], there where differences were taken;
-    what the simulator need not repeat when they are taken anew nearby."""
-
-    def of(self, episodes: Ints) -> Linear:
-        """The same of some episodes."""
-        parts = (self.residual, self.jacobian, self.launch_jacobian, self.onset)
-        return Linear(*(part[episodes] for part in parts))
 
 
 @dataclass(frozen=True)
@@ -72,109 +37,6 @@ class Fit:
     """The cost stopped falling; False: the iterations ran out."""
 
 
-def start(likelihood: Likelihood, values: Floats) -> Point:
-    """A point at the commanded launches."""
-    return Point(values, np.zeros_like(likelihood.inputs), np.inf)
-
-
-def cost(likelihood: Likelihood, points: list[Point], robust: float) -> tuple[Floats, Floats]:
-    """(N,) cost and (N, E, F, C) residual of each point, all rolled out in one batch."""
-    episodes = len(likelihood.inputs)
-    values = np.repeat(np.stack([p.values for p in points]), episodes, axis=0)
-    inputs = np.concatenate([likelihood.inputs + p.launch for p in points])
-    flat = likelihood.residual(values, inputs, np.tile(np.arange(episodes), len(points)))
-    residual = flat.reshape(len(points), episodes, *flat.shape[1:])
-    of_point = robust_loss(residual, robust).reshape(len(points), -1).sum(axis=1)
-    return np.array([0.5 * c + _prior(likelihood, p) for c, p in zip(of_point, points, strict=True)]), residual
-
-
-def robust_loss(residual: Floats, robust: float) -> Floats:
-    """rho of each residual: its square where it is small beside the scale, twice the scale times it where large."""
-    squared = residual**2
-    return np.asarray(2 * squared / (np.sqrt(1 + squared / robust**2) + 1))  # stable for large scales
-
-
-def robust_weight(residual: Floats, robust: float) -> Floats:
-    """Factor of each squared residual that gives the robust loss's gradient: 1 where small, falling where large."""
-    return np.asarray(1 / np.sqrt(1 + (residual / robust) ** 2))
-
-
-def _prior(likelihood: Likelihood, point: Point) -> float:
-    scaled = (point.values - likelihood.prior_mean) / likelihood.prior_std
-    random = likelihood.launch_std > 0
-    launch = point.launch[:, random] / likelihood.launch_std[random]
-    return 0.5 * float(np.sum(scaled**2) + np.sum(launch**2))
-
-
-def inward(likelihood: Likelihood, point: Point, which: Ints, steps: Floats) -> Floats:
-    """(p,) changes of some parameters in their units, from steps in standard deviations of the prior.
-
-    A step that would leave the bounds is taken to the other side; where both sides end too soon, to the farther bound.
-    """
-    value, low, high = point.values[which], likelihood.low[which], likelihood.high[which]
-    ahead = steps * likelihood.prior_std[which]
-    fits, fits_back = ((value + step >= low) & (value + step <= high) for step in (ahead, -ahead))
-    farther = np.where(high - value >= value - low, high, low) - value
-    return np.where(fits, ahead, np.where(fits_back, -ahead, farther))
-
-
-def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats, onset: Floats | None = None) -> Linear:
-    """Residual and one-sided differences at a point; (p,) steps in standard deviations of the prior, as in `inward`.
-
-    `onset`: as in `Linear`, at a point nearby.
-    """
-    episodes = len(likelihood.inputs)
-    random = np.flatnonzero(likelihood.launch_std > 0)
-    steps = inward(likelihood, point, free, steps)
-    columns = 1 + len(free) + len(random)
-    values = np.tile(point.values, (columns, episodes, 1))
-    inputs = np.tile(likelihood.inputs + point.launch, (columns, 1, 1))
-    for i, parameter in enumerate(free):
-        values[1 + i, :, parameter] += steps[i]
-    for i, column in enumerate(random):
-        inputs[1 + len(free) + i, :, column] += 0.1 * likelihood.launch_std[column]
-    index = np.tile(np.arange(episodes), columns)
-    until = np.zeros((columns, episodes))
-    if onset is not None:
-        until[1 : 1 + len(free)] = np.maximum(onset.T - MARGIN_S, 0.0)
-    rows = len(index)
-    flat, same = likelihood.residual_alike(
-        values.reshape(rows, values.shape[2]), inputs.reshape(rows, inputs.shape[2]), index, index, until.ravel()
-    )
-    residual = flat.reshape(columns, episodes, *flat.shape[1:])
-    scale = likelihood.prior_std[free] / steps
-    jacobian = np.moveaxis((residual[1 : 1 + len(free)] - residual[0]) * scale[:, None, None, None], 0, -1)
-    launch = np.moveaxis((residual[1 + len(free) :] - residual[0]) * 10.0, 0, -1)
-    return Linear(residual[0], jacobian, launch, same.reshape(columns, episodes)[1 : 1 + len(free)].T)
-
-
-def extended(old: Linear, likelihood: Likelihood, point: Point, residual: Floats, free: Ints) -> Linear:
-    """Differences that are known of the first of the `free` parameters, with those of the others taken at a point.
-
-    `residual`: (E, F, C) there.
-    """
-    new = free[old.jacobian.shape[-1] :]
-    episodes = len(likelihood.inputs)
-    steps = inward(likelihood, point, new, np.full(len(new), FIRST_STEP))
-    values = np.tile(point.values, (len(new), 1))
-    values[np.arange(len(new)), new] += steps
-    index = np.tile(np.arange(episodes), len(new))
-    inputs = np.tile(likelihood.inputs + point.launch, (len(new), 1))
-    there = likelihood.residual(np.repeat(values, episodes, axis=0), inputs, index)
-    change = there.reshape(len(new), *residual.shape) - residual
-    scaled = np.moveaxis(change * (likelihood.prior_std[new] / steps)[:, None, None, None], 0, -1)
-    onset = np.concatenate([old.onset, np.zeros((episodes, len(new)))], axis=1)
-    return Linear(residual, np.concatenate([old.jacobian, scaled], axis=-1), old.launch_jacobian, onset)
-
-
-def central(likelihood: Likelihood, point: Point, free: Ints, steps: Floats, onset: Floats | None = None) -> Linear:
-    """The same with central differences: exact to second order, for twice the rollouts."""
-    up = linearise(likelihood, point, free, steps, onset)
-    down = linearise(likelihood, point, free, -steps, up.onset)
-    jacobian = 0.5 * (up.jacobian + down.jacobian)
-    return Linear(up.residual, jacobian, up.launch_jacobian, np.minimum(up.onset, down.onset))
-
-
 def moved(likelihood: Likelihood, point: Point, free: Ints, move: Floats) -> Point:
     """A point moved by (n,) standard deviations of the prior, inside the bounds."""
     p = len(free)
@@ -185,16 +47,6 @@ def moved(likelihood: Likelihood, point: Point, free: Ints, move: Floats) -> Poi
     random = likelihood.launch_std > 0
     launch[:, random] += move[p:].reshape(len(launch), -1) * likelihood.launch_std[random]
     return Point(values, launch, np.inf)
-
-
-def difference_steps(linear: Linear) -> Floats:
-    """(p,) steps that move the residual by about one sigma: above the simulator's roughness, below its curvature.
-
-    Judged by the upper quartile over episodes, since one episode with an unlucky collision would make all steps tiny.
-    """
-    effect = np.sqrt(np.mean(linear.jacobian**2, axis=(1, 2)))  # (E, p)
-    typical = np.quantile(effect, 0.75, axis=0)
-    return np.asarray(np.clip(1.0 / np.maximum(typical, 1e-12), 1e-3, 1.0))
 
 
 def normal_equations(
@@ -254,10 +106,16 @@ def minimise(
         if linear is None:
             linear, steps = _linearise_well(likelihood, point, free, steps, onset)
             onset, exact = linear.onset, True
-        step = _best_step(likelihood, point, linear, free, robust, damping)
+        normal = normal_equations(likelihood, point, linear, free, robust)
+        (step,) = tried(likelihood, point, free, normal, robust, [damping])
+        as_hoped = point.cost - step.point.cost > _AS_HOPED * step.hoped
+        if not as_hoped:
+            others = [damping * factor for factor in _OTHERS]
+            step = lowest([step, *tried(likelihood, point, free, normal, robust, others)])
         gained = point.cost - step.point.cost
         if gained > 0:
-            damping, point = step.damping, step.point
+            damping = max(step.damping * (_EASIER if as_hoped else 1.0), 1e-9)
+            point = step.point
             converged = exact and gained < tolerance
             keep = converged or (gained > 0.5 * step.hoped and gained > tolerance)
             linear = broyden(linear, step.residual, step.move) if keep else None
@@ -273,7 +131,7 @@ def minimise(
 
 
 @dataclass(frozen=True)
-class _Step:
+class Step:
     """A damped step that was tried."""
 
     point: Point
@@ -284,25 +142,30 @@ class _Step:
     hoped: float
     """Fall of the cost by the linear model."""
     damping: float
-    """To begin the next step with."""
 
 
-def _best_step(
-    likelihood: Likelihood, point: Point, linear: Linear, free: Ints, robust: float, damping: float
-) -> _Step:
-    """The step with this damping where it does what the linear model hopes for; else the best with others too."""
-    hessian, gradient = normal_equations(likelihood, point, linear, free, robust)
-    found: list[_Step] = []
-    for factors in _TRIALS:
-        dampings = [damping * factor for factor in factors]
-        trials = [damped_step(likelihood, point, free, hessian, gradient, d) for d in dampings]
-        for trial, c, residual, d in zip(trials, *cost(likelihood, trials, robust), dampings, strict=True):
-            move = move_between(likelihood, point, trial, free)
-            hoped = -float(gradient @ move + 0.5 * move @ hessian @ move)
-            found.append(_Step(replace(trial, cost=float(c)), residual, move, hoped, max(d, 1e-9)))
-        if len(found) == 1 and point.cost - found[0].point.cost > _AS_HOPED * found[0].hoped:
-            return replace(found[0], damping=max(_EASIER * damping, 1e-9))
-    return min(found, key=lambda step: step.point.cost)
+def tried(
+    likelihood: Likelihood,
+    point: Point,
+    free: Ints,
+    normal: tuple[Floats, Floats],
+    robust: float,
+    dampings: Sequence[float],
+) -> list[Step]:
+    """A step with each damping, all rolled out in one batch; `normal` equations at the point."""
+    hessian, gradient = normal
+    trials = [damped_step(likelihood, point, free, hessian, gradient, damping) for damping in dampings]
+    found = []
+    for trial, c, residual, damping in zip(trials, *cost(likelihood, trials, robust), dampings, strict=True):
+        move = move_between(likelihood, point, trial, free)
+        hoped = -float(gradient @ move + 0.5 * move @ hessian @ move)
+        found.append(Step(replace(trial, cost=float(c)), residual, move, hoped, damping))
+    return found
+
+
+def lowest(steps: Sequence[Step]) -> Step:
+    """The one that ends lowest."""
+    return min(steps, key=lambda step: step.point.cost)
 
 
 def _linearise_well(
@@ -323,23 +186,6 @@ def move_between(likelihood: Likelihood, old: Point, new: Point, free: Ints) -> 
     values = (new.values - old.values)[free] / likelihood.prior_std[free]
     launch = (new.launch - old.launch)[:, random] / likelihood.launch_std[random]
     return np.concatenate([values, launch.ravel()])
-
-
-def broyden(linear: Linear, residual: Floats, move: Floats) -> Linear:
-    """The least change of the differences that predicts the step's residual (Broyden 1965, rank one per episode)."""
-    episodes, p = len(residual), linear.jacobian.shape[-1]
-    launches = move[p:].reshape(episodes, -1)
-    predicted = linear.residual + linear.jacobian @ move[:p]
-    predicted += np.einsum("efcl,el->efc", linear.launch_jacobian, launches)
-    missed = residual - predicted
-    length = np.sum(move[:p] ** 2) + np.sum(launches**2, axis=1)  # (E,)
-    share = missed / np.maximum(length, 1e-300)[:, None, None]
-    return replace(
-        linear,
-        residual=residual,
-        jacobian=linear.jacobian + share[..., None] * move[:p],
-        launch_jacobian=linear.launch_jacobian + share[..., None] * launches[:, None, None],
-    )
 
 
 def damped_step(

@@ -12,16 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from compass_ros.calibration.cost import Point, start
+from compass_ros.calibration.differences import Linear, difference_steps, linearise
 from compass_ros.calibration.identifiability import WIDER, alone
-from compass_ros.calibration.least_squares import (
-    Fit,
-    Linear,
-    Point,
-    difference_steps,
-    linearise,
-    minimise,
-    start,
-)
+from compass_ros.calibration.least_squares import Fit, minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.residuals import chi_square, covariance, information_share, typical_residual
 from compass_ros.calibration.screen import WORTH, acting, coupling, independent, many

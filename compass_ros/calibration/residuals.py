@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, Linear, Point, normal_equations
+from compass_ros.calibration.cost import Point
+from compass_ros.calibration.differences import Linear
+from compass_ros.calibration.least_squares import Fit, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import integrated_correlation_time
 from compass_ros.types import Floats

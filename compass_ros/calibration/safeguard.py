@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from compass_ros.calibration.least_squares import Point, start
+from compass_ros.calibration.cost import Point, start
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import (
     ROBUST,

@@ -15,7 +15,8 @@ from itertools import groupby
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Point, inward
+from compass_ros.calibration.cost import Point
+from compass_ros.calibration.differences import inward
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.types import Bools, Floats, Ints
 

@@ -4,23 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
-from compass_ros.calibration.least_squares import (
-    Fit,
-    Linear,
-    Point,
-    broyden,
-    central,
-    cost,
-    damped_step,
-    difference_steps,
-    move_between,
-    normal_equations,
-)
+from compass_ros.calibration.cost import cost
+from compass_ros.calibration.differences import broyden, central, difference_steps
+from compass_ros.calibration.least_squares import Fit, lowest, normal_equations, tried
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.valleys import along_valleys
-from compass_ros.types import Floats, Ints
 
 SETTLING = 6
 """How often differences are taken at the end, at most: a budget."""
@@ -54,26 +42,17 @@ def settled(likelihood: Likelihood, fit: Fit, rounds: int = 2) -> Fit:
         linear = along_valleys(likelihood, point, linear, free, robust)
         before = point.cost
         for _ in range(SERVE):
-            best, residual = _best_step(likelihood, point, linear, free, robust)
-            step = point.cost - best.cost
+            normal = normal_equations(likelihood, point, linear, free, robust)
+            best = lowest(tried(likelihood, point, free, normal, robust, _DAMPING))
+            step = point.cost - best.point.cost
             if step <= 0:
                 break
-            move = move_between(likelihood, point, best, free)
-            point = best
+            point = best.point
             if step < SETTLED:  # over a step as short as this differences show the simulator's roughness
-                linear = replace(linear, residual=residual)
+                linear = replace(linear, residual=best.residual)
                 break
-            linear = broyden(linear, residual, move)
+            linear = broyden(linear, best.residual, best.move)
         unexplained = point.cost - 0.5 * likelihood.measurements
         if taken >= rounds - 1 and before - point.cost < max(SETTLED, WORTHWHILE * unexplained):
             break
     return replace(fit, point=point, linear=linear)
-
-
-def _best_step(likelihood: Likelihood, point: Point, linear: Linear, free: Ints, robust: float) -> tuple[Point, Floats]:
-    """The best of some damped steps, with its residual."""
-    hessian, gradient = normal_equations(likelihood, point, linear, free, robust)
-    trials = [damped_step(likelihood, point, free, hessian, gradient, damping) for damping in _DAMPING]
-    costs, residuals = cost(likelihood, trials, robust)
-    best = int(np.argmin(costs))
-    return replace(trials[best], cost=float(costs[best])), residuals[best]

@@ -11,7 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Linear, Point, cost, moved, robust_weight
+from compass_ros.calibration.cost import Point, cost, robust_weight
+from compass_ros.calibration.differences import Linear
+from compass_ros.calibration.least_squares import moved
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.types import Bools, Floats, Ints
 

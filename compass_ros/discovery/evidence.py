@@ -22,7 +22,7 @@ from functools import cached_property
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import robust_loss, robust_weight
+from compass_ros.calibration.cost import robust_loss, robust_weight
 from compass_ros.types import Floats
 
 ROUNDS = 2

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from compass_ros.calibration.least_squares import robust_weight
+from compass_ros.calibration.cost import robust_weight
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.response import Response
 from compass_ros.discovery.shapes import best_shapes

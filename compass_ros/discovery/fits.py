@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, Point, cost, difference_steps, extended, minimise, robust_loss
+from compass_ros.calibration.cost import Point, cost, robust_loss
+from compass_ros.calibration.differences import difference_steps, extended
+from compass_ros.calibration.least_squares import Fit, minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import Strongest, growing, strongest
 from compass_ros.calibration.residuals import typical_residual

@@ -13,7 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, Point, cost
+from compass_ros.calibration.cost import Point, cost
+from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise, correlation_of
 from compass_ros.calibration.refine import Refined

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, normal_equations, robust_weight
+from compass_ros.calibration.cost import robust_weight
+from compass_ros.calibration.least_squares import Fit, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.evidence import solve
 from compass_ros.discovery.hypothesis import Hypothesis

@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, Point, minimise
+from compass_ros.calibration.cost import Point
+from compass_ros.calibration.least_squares import Fit, minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.residuals import covariance
 from compass_ros.discovery.candidates import Candidate

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import robust_weight
+from compass_ros.calibration.cost import robust_weight
 from compass_ros.calibration.noise import Noise, correlated
 from compass_ros.discovery.discrepancy import free_sizes, spread
 from compass_ros.discovery.evidence import Factored

@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import cma
 import numpy as np
 
+from compass_ros.calibration.cost import start
+from compass_ros.calibration.differences import Linear, difference_steps, linearise
 from compass_ros.calibration.identifiability import information, told
-from compass_ros.calibration.least_squares import Linear, difference_steps, linearise, start
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import measure_noise
 from compass_ros.calibration.settle import FINE

@@ -12,8 +12,8 @@ from itertools import product
 
 import numpy as np
 
+from compass_ros.calibration.cost import robust_weight
 from compass_ros.calibration.identifiability import information as information_of
-from compass_ros.calibration.least_squares import robust_weight
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.response import Response
 from compass_ros.simulation.effects import Quantity

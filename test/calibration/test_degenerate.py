@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compass_ros.calibration.least_squares import inward, start
+from compass_ros.calibration.cost import start
+from compass_ros.calibration.differences import inward
 from compass_ros.calibration.likelihood import HOPELESS, Likelihood
 from compass_ros.calibration.refine import refine, standard_errors
 from compass_ros.types import Floats

@@ -7,16 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compass_ros.calibration.least_squares import (
-    Fit,
-    Point,
-    central,
-    cost,
-    linearise,
-    minimise,
-    normal_equations,
-    start,
-)
+from compass_ros.calibration.cost import Point, cost, start
+from compass_ros.calibration.differences import central, linearise
+from compass_ros.calibration.least_squares import Fit, minimise, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.settle import settled
 from compass_ros.types import Floats

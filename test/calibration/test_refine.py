@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from compass_ros.calibration.least_squares import Point, minimise, start
+from compass_ros.calibration.cost import Point, start
+from compass_ros.calibration.least_squares import minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import Refined, growing, refine, standard_errors
 from compass_ros.calibration.residuals import chi_square

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, minimise, normal_equations, start
+from compass_ros.calibration.cost import start
+from compass_ros.calibration.least_squares import Fit, minimise, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.residuals import jackknife
 from compass_ros.types import Floats

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compass_ros.calibration.least_squares import start
+from compass_ros.calibration.cost import start
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import refine, sensitivity, standard_errors
 from compass_ros.calibration.screen import GROUP, acting, alike, coupling, independent

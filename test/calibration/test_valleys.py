@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compass_ros.calibration.least_squares import Linear, linearise, start
+from compass_ros.calibration.cost import start
+from compass_ros.calibration.differences import Linear, linearise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import refine
 from compass_ros.calibration.valleys import along_valleys

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import multivariate_normal
 
-from compass_ros.calibration.least_squares import robust_loss
+from compass_ros.calibration.cost import robust_loss
 from compass_ros.discovery.evidence import Factored, Normal, Tangent, evidences, log_sum, residual_of, solve
 from compass_ros.types import Floats
 

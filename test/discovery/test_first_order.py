@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compass_ros.calibration.least_squares import Fit, Point, linearise
+from compass_ros.calibration.cost import Point
+from compass_ros.calibration.differences import linearise
+from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.candidates import Candidate, candidates
 from compass_ros.discovery.evidence import Factored, Tangent

@@ -8,7 +8,9 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from compass_ros.calibration.least_squares import Fit, Linear, start
+from compass_ros.calibration.cost import start
+from compass_ros.calibration.differences import Linear
+from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.discovery.floor import TWICE, honest, shown_noise

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compass_ros.calibration.least_squares import Fit, Point, linearise
+from compass_ros.calibration.cost import Point
+from compass_ros.calibration.differences import linearise
+from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.noise import Noise
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import discover

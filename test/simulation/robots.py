@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, linearise, start
+from compass_ros.calibration.cost import start
+from compass_ros.calibration.differences import linearise
+from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.cells import Cell
 from compass_ros.discovery.planned import perfect

@@ -1,0 +1,132 @@
+"""The model linearised at a point: finite differences, taken in one batch of rollouts, and kept up by secants."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compass_ros.calibration.cost import Point
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.types import Floats, Ints
+
+FIRST_STEP = 0.02
+"""First finite differences, in standard deviations of the prior."""
+MARGIN_S = 0.1
+"""How much earlier than at a point nearby a parameter may begin to act [s]."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """The model linearised at a point. n = free parameters + launches."""
+
+    residual: Floats
+    """(E, F, C) in sigma."""
+    jacobian: Floats
+    """(E, F, C, p) change of the residual per prior standard deviation of each free parameter."""
+    launch_jacobian: Floats
+    """(E, F, C, l) change of the episode's own residual per standard deviation of its launch."""
+    onset: Floats
+    """(E, p) simulated time up to which a parameter did nothing in an episode [s], there where differences were taken;
+    what the simulator need not repeat when they are taken anew nearby."""
+
+    def of(self, episodes: Ints) -> Linear:
+        """The same of some episodes."""
+        parts = (self.residual, self.jacobian, self.launch_jacobian, self.onset)
+        return Linear(*(part[episodes] for part in parts))
+
+
+def inward(likelihood: Likelihood, point: Point, which: Ints, steps: Floats) -> Floats:
+    """(p,) changes of some parameters in their units, from steps in standard deviations of the prior.
+
+    A step that would leave the bounds is taken to the other side; where both sides end too soon, to the farther bound.
+    """
+    value, low, high = point.values[which], likelihood.low[which], likelihood.high[which]
+    ahead = steps * likelihood.prior_std[which]
+    fits, fits_back = ((value + step >= low) & (value + step <= high) for step in (ahead, -ahead))
+    farther = np.where(high - value >= value - low, high, low) - value
+    return np.where(fits, ahead, np.where(fits_back, -ahead, farther))
+
+
+def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats, onset: Floats | None = None) -> Linear:
+    """Residual and one-sided differences at a point; (p,) steps in standard deviations of the prior, as in `inward`.
+
+    `onset`: as in `Linear`, at a point nearby.
+    """
+    episodes = len(likelihood.inputs)
+    random = np.flatnonzero(likelihood.launch_std > 0)
+    steps = inward(likelihood, point, free, steps)
+    columns = 1 + len(free) + len(random)
+    values = np.tile(point.values, (columns, episodes, 1))
+    inputs = np.tile(likelihood.inputs + point.launch, (columns, 1, 1))
+    for i, parameter in enumerate(free):
+        values[1 + i, :, parameter] += steps[i]
+    for i, column in enumerate(random):
+        inputs[1 + len(free) + i, :, column] += 0.1 * likelihood.launch_std[column]
+    index = np.tile(np.arange(episodes), columns)
+    until = np.zeros((columns, episodes))
+    if onset is not None:
+        until[1 : 1 + len(free)] = np.maximum(onset.T - MARGIN_S, 0.0)
+    rows = len(index)
+    flat, same = likelihood.residual_alike(
+        values.reshape(rows, values.shape[2]), inputs.reshape(rows, inputs.shape[2]), index, index, until.ravel()
+    )
+    residual = flat.reshape(columns, episodes, *flat.shape[1:])
+    scale = likelihood.prior_std[free] / steps
+    jacobian = np.moveaxis((residual[1 : 1 + len(free)] - residual[0]) * scale[:, None, None, None], 0, -1)
+    launch = np.moveaxis((residual[1 + len(free) :] - residual[0]) * 10.0, 0, -1)
+    return Linear(residual[0], jacobian, launch, same.reshape(columns, episodes)[1 : 1 + len(free)].T)
+
+
+def extended(old: Linear, likelihood: Likelihood, point: Point, residual: Floats, free: Ints) -> Linear:
+    """Differences that are known of the first of the `free` parameters, with those of the others taken at a point.
+
+    `residual`: (E, F, C) there.
+    """
+    new = free[old.jacobian.shape[-1] :]
+    episodes = len(likelihood.inputs)
+    steps = inward(likelihood, point, new, np.full(len(new), FIRST_STEP))
+    values = np.tile(point.values, (len(new), 1))
+    values[np.arange(len(new)), new] += steps
+    index = np.tile(np.arange(episodes), len(new))
+    inputs = np.tile(likelihood.inputs + point.launch, (len(new), 1))
+    there = likelihood.residual(np.repeat(values, episodes, axis=0), inputs, index)
+    change = there.reshape(len(new), *residual.shape) - residual
+    scaled = np.moveaxis(change * (likelihood.prior_std[new] / steps)[:, None, None, None], 0, -1)
+    onset = np.concatenate([old.onset, np.zeros((episodes, len(new)))], axis=1)
+    return Linear(residual, np.concatenate([old.jacobian, scaled], axis=-1), old.launch_jacobian, onset)
+
+
+def central(likelihood: Likelihood, point: Point, free: Ints, steps: Floats, onset: Floats | None = None) -> Linear:
+    """The same with central differences: exact to second order, for twice the rollouts."""
+    up = linearise(likelihood, point, free, steps, onset)
+    down = linearise(likelihood, point, free, -steps, up.onset)
+    jacobian = 0.5 * (up.jacobian + down.jacobian)
+    return Linear(up.residual, jacobian, up.launch_jacobian, np.minimum(up.onset, down.onset))
+
+
+def difference_steps(linear: Linear) -> Floats:
+    """(p,) steps that move the residual by about one sigma: above the simulator's roughness, below its curvature.
+
+    Judged by the upper quartile over episodes, since one episode with an unlucky collision would make all steps tiny.
+    """
+    effect = np.sqrt(np.mean(linear.jacobian**2, axis=(1, 2)))  # (E, p)
+    typical = np.quantile(effect, 0.75, axis=0)
+    return np.asarray(np.clip(1.0 / np.maximum(typical, 1e-12), 1e-3, 1.0))
+
+
+def broyden(linear: Linear, residual: Floats, move: Floats) -> Linear:
+    """The least change of the differences that predicts the step's residual (Broyden 1965, rank one per episode)."""
+    episodes, p = len(residual), linear.jacobian.shape[-1]
+    launches = move[p:].reshape(episodes, -1)
+    predicted = linear.residual + linear.jacobian @ move[:p]
+    predicted += np.einsum("efcl,el->efc", linear.launch_jacobian, launches)
+    missed = residual - predicted
+    length = np.sum(move[:p] ** 2) + np.sum(launches**2, axis=1)  # (E,)
+    share = missed / np.maximum(length, 1e-300)[:, None, None]
+    return replace(
+        linear,
+        residual=residual,
+        jacobian=linear.jacobian + share[..., None] * move[:p],
+        launch_jacobian=linear.launch_jacobian + share[..., None] * launches[:, None, None],
+    )
