@@ -13,6 +13,7 @@ from compass_ros.discovery.finding import Discovery, Tried, Weighed, held_out_er
 from compass_ros.discovery.floor import TWICE, shown_noise
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.maps import table_map
+from compass_ros.discovery.neighbours import SLIGHT
 from compass_ros.discovery.next_shot import next_experiment
 from compass_ros.discovery.numerics import with_numerics
 from compass_ros.discovery.search import Found
@@ -38,8 +39,6 @@ from compass_ros.types import (
 UNKNOWN = "unknown"
 SAID = 6
 """Models with laws that a result lists; the rest together are less than a thousandth or so."""
-LEAST = 0.01
-"""Probability below which a model is not handed on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,10 +76,10 @@ class Judge:
         return self._named(models, "named" if len(models) == 1 else "ambiguous")
 
     def _weighed(self) -> tuple[Weighed, ...]:
-        """The models that have a hundredth of the probability or more, the plain one among them."""
+        """The models that have a share of the probability, the plain one too; others are not at their optimum."""
         none, _, of_models = self.found.probabilities
         rows = [(none, self.found.plain), *zip(of_models, self.found.models, strict=True)]
-        return tuple(Weighed(float(p), m.simulator, m.fit.point.values, m.root) for p, m in rows if p >= LEAST)
+        return tuple(Weighed(float(p), m.simulator, m.fit.point.values, m.root) for p, m in rows if p >= SLIGHT)
 
     def _explaining(self, of_models: Floats) -> list[Hypothesis]:
         """The smallest set of models that holds 1 - alpha, the most probable first.

@@ -29,9 +29,13 @@ class Case:
     values: Floats
     """(N, P) its parameters, and those of its laws: of N rows each rollout takes one at random."""
 
+    def drawn(self, count: int, rng: Generator) -> Floats:
+        """(count, P) rows of its parameters."""
+        return np.asarray(self.values[rng.integers(len(self.values), size=count)])
+
     def observe(self, commands: Floats, time_s: Floats, rng: Generator) -> Floats:
         """(B, F, C) for (B, A) commands at (F,) times; what laws of chance do is drawn for each."""
-        values = self.values[rng.integers(len(self.values), size=len(commands))]
+        values = self.drawn(len(commands), rng)
         inputs = self.simulator.inputs(commands)
         if beyond := inputs.shape[1] - commands.shape[1]:
             scatter = self.simulator.launch_std(self.values.mean(axis=0))[-beyond:]
@@ -46,10 +50,15 @@ class Belief:
     cases: tuple[Case, ...]
     correction: Correction | None = None
 
+    @property
+    def shares(self) -> Floats:
+        """Of each case; they sum to one."""
+        shares = np.array([case.share for case in self.cases])
+        return np.asarray(shares / shares.sum())
+
     def observe(self, commands: Floats, time_s: Floats, rng: Generator) -> Floats:
         """(B, F, C) what the tracker would say; each row is one draw of what is held true."""
-        shares = np.array([case.share for case in self.cases])
-        of = rng.choice(len(shares), size=len(commands), p=shares / shares.sum())
+        of = rng.choice(len(self.cases), size=len(commands), p=self.shares)
         parts = [(np.flatnonzero(of == i), case) for i, case in enumerate(self.cases)]
         seen = [(rows, case.observe(commands[rows], time_s, rng)) for rows, case in parts if len(rows)]
         out = np.empty((len(commands), *seen[0][1].shape[1:]))

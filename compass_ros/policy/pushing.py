@@ -57,10 +57,9 @@ class Simulated:
             raise ConfigError("a policy over time cannot be trained with a correction of whole trajectories")
 
     def reset(self, across: Floats) -> tuple[Floats, Floats]:
-        shares = np.array([case.share for case in self._belief.cases])
-        case = self._belief.cases[int(self._rng.choice(len(shares), p=shares / shares.sum()))]
+        case = self._belief.cases[int(self._rng.choice(len(self._belief.cases), p=self._belief.shares))]
         self._simulator, cell = case.simulator, case.simulator.cell
-        self._values = case.values[self._rng.integers(len(case.values), size=self.count)]
+        self._values = case.drawn(self.count, self._rng)
         inputs = np.zeros((self.count, len(cell.input_names)))
         inputs[:, 0] = across + self._repeats * self._rng.standard_normal(self.count)
         self._state = self._simulator.begun(self._values, self._simulator.inputs(inputs), CONTROL_S)[0]

@@ -16,7 +16,7 @@ from compass_ros.policy import ROLLOUTS, Belief, Shots, pushing, train
 from compass_ros.simulation.factors import factor_distance
 from compass_ros.transfer.experiment import Experiment
 from compass_ros.transfer.simulators import Makers, recorded
-from compass_ros.types import Floats, Report, silent
+from compass_ros.types import Bools, Floats, Report, silent
 from compass_ros.worlds.played import Played
 
 SCHEMA = "compass/policy/1"
@@ -116,11 +116,7 @@ def over_time(
     promised = pushing.near(pushing.played(policy, own)[-1])
     end = pushing.played(policy, experiment.over_time(SHOTS, 1000 + seed))[-1]
     hit, distance = pushing.near(end), np.linalg.norm(end[:, :2] - pushing.TARGET[:2], axis=1)
-    return {
-        "success": round(float(hit[:PAPER].mean()), 3),
-        "distance_m": round(float(distance[:PAPER].mean()), 4),
-        "success_100": round(float(hit[PAPER:].mean()), 3),
-        "distance_100_m": round(float(distance[PAPER:].mean()), 4),
+    return _counted(hit, distance, PAPER) | {
         "promised": round(float(promised.mean()), 3),
         "trained_s": round(wall, 1),
         "trained_cpu_s": round(cpu, 1),
@@ -148,19 +144,24 @@ def outcome(
     """
     end = played.seen[:, -1, _columns(experiment)]
     distance = np.linalg.norm(end - np.array(experiment.goal.centre), axis=1)
-    hit = distance <= experiment.goal.radius
-    out: dict[str, object] = {
-        "success": round(float(hit[:first].mean()), 3),
-        "distance_m": round(float(distance[:first].mean()), 4),
-    }
-    if len(hit) > first:
-        out["success_100"] = round(float(hit[first:].mean()), 3)
-        out["distance_100_m"] = round(float(distance[first:].mean()), 4)
+    out = _counted(distance <= experiment.goal.radius, distance, first)
     if belief.cases:
         some = replace(played, seen=played.seen[:first])
         d = differences(experiment, belief, np.tile(command, (first, 1)), some, seed)
         out["difference_own_m"] = [round(float(x), 3) for x in (d.min(), d.max(), d.mean())]
     return out
+
+
+def _counted(hit: Bools, distance: Floats, first: int) -> dict[str, object]:
+    """Success and mean last distance [m] of the first shots, and of those that follow."""
+
+    def of(which: slice, shots: str) -> dict[str, object]:
+        return {
+            f"success{shots}": round(float(hit[which].mean()), 3),
+            f"distance{shots}_m": round(float(distance[which].mean()), 4),
+        }
+
+    return of(slice(first), "") | (of(slice(first, None), "_100") if len(hit) > first else {})
 
 
 def differences(experiment: Experiment, belief: Belief, commands: Floats, played: Played, seed: int) -> Floats:

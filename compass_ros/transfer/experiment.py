@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,10 @@ MOVED = ((-0.16, 0.015), (-0.08, -0.06))
 """Other places of the pucks at the start [m]."""
 
 
+def _as_it_was(belief: Belief, condition: str, folder: Path) -> Belief:
+    return belief
+
+
 @dataclass(frozen=True)
 class Experiment:
     """One task of the paper."""
@@ -39,10 +43,10 @@ class Experiment:
     """Those in which recordings are made; then those that are changed afterwards."""
     play: Callable[[str, Floats, int], Played]
     """Condition, (S, A) commands, seed -> what happened."""
-    told: Callable[[Belief, str, Path], Belief]
+    told: Callable[[Belief, str, Path], Belief] = _as_it_was
     """What a simulator makes of what everybody knows of a changed condition (a mass on a scale, places at the start);
     the path is a folder for scenes."""
-    changed: Mapping[str, str]
+    changed: Mapping[str, str] = field(default_factory=dict)
     """Changed conditions, and the one whose recordings simulators and policies come from."""
     over_time: Callable[[int, int], Bars] | None = None
     """Count, seed -> the concealed cell in steps, where a policy acts over time; None: its action is one command."""
@@ -61,20 +65,20 @@ class Experiment:
 
     def itself(self, condition: str) -> Belief:
         """The concealed cell as if it were a simulator: what no method can do better than."""
-        return Itself(self, condition)
+        return Itself(experiment=self, condition=condition)
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Itself(Belief):
     """The concealed cell in the place of a simulator."""
 
-    def __init__(self, experiment: Experiment, condition: str) -> None:
-        super().__init__(())
-        object.__setattr__(self, "_asked", (experiment, condition))
+    cases: tuple[Case, ...] = ()
+    experiment: Experiment
+    condition: str
 
     def observe(self, commands: Floats, time_s: Floats, rng: Generator) -> Floats:
-        experiment, condition = self._asked  # type: ignore[attr-defined]
-        played = experiment.play(condition, commands, int(rng.integers(2**31)))
-        return np.asarray(played.seen[:, np.round(time_s / experiment.cell.control_dt).astype(int)])
+        played = self.experiment.play(self.condition, commands, int(rng.integers(2**31)))
+        return np.asarray(played.seen[:, np.round(time_s / self.experiment.cell.control_dt).astype(int)])
 
 
 def air_hockey() -> Experiment:
@@ -155,8 +159,6 @@ def bouncing_ball() -> Experiment:
         Goal("ball", (0.445, 0.0, 0.085), 0.055),  # what the basket holds: 13 cm wide, the ball lies 7 to 11.5 cm high
         ("real",),
         play,
-        lambda belief, condition, folder: belief,
-        {},
     )
 
 
@@ -174,9 +176,7 @@ def push_i() -> Experiment:
         Goal("bar", (*pushing.TARGET[:2], 0.0), pushing.NEAR_M),
         ("real",),
         play,
-        lambda belief, condition, folder: belief,
-        {},
-        lambda count, seed: bar.Pushing(task, count, seed),
+        over_time=lambda count, seed: bar.Pushing(task, count, seed),
     )
 
 

@@ -60,8 +60,7 @@ class Makers:
 
     def make(self, name: str, fine: bool = False) -> Belief:
         """The simulator of that name, in coarser steps or, `fine`, the scene's. Raises ConfigError for others."""
-        if name not in NAMES:
-            raise ConfigError(f"unknown simulator '{name}'; known: {', '.join(NAMES)}{nearest(name, NAMES)}")
+        chosen([name])
         if name == "itself":
             return self.experiment.itself(self.condition)
         if name == "residual":

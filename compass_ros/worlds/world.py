@@ -23,6 +23,10 @@ class Task:
     model: Path
     parameters: tuple[Parameter, ...]
 
+    def values(self, true: Mapping[str, float]) -> dict[str, float]:
+        """All of them, as in the drawing but for these."""
+        return {p.name: p.default for p in self.parameters} | dict(true)
+
 
 @dataclass(frozen=True)
 class Asked:

@@ -52,7 +52,7 @@ def laws() -> dict[str, Drawn]:
 def drop(task: Task, commands: Floats, seed: int, steps: int = 36) -> Played:
     """Play (S, 1) heights [m]; the same seed gives the same bits."""
     arm, camera = (np.random.default_rng([seed, i]) for i in range(2))
-    values = {p.name: p.default for p in task.parameters} | dict(TRUE)
+    values = task.values(TRUE)
     heights = commands[:, 0] + REPEATS_M * arm.standard_normal(len(commands))
     rig, missing = Rig(values), laws()
     duration = steps * STEP_S + 0.06

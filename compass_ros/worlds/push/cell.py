@@ -47,7 +47,7 @@ class Pushing:
 
     def __init__(self, task: Task, count: int, seed: int, physics: Physics | None = None, noisy: bool = True) -> None:
         """`physics`: None: that of this cell. `noisy`: whether tracker and arm err."""
-        self._values = {p.name: p.default for p in task.parameters} | dict(TRUE)
+        self._values = task.values(TRUE)
         self.count, self._rng, self._noisy = count, np.random.default_rng([seed, 4]), float(noisy)
         self._rig = Rig(self._values)
         self._physics = physics or scene.physics(self._values, laws())
@@ -78,7 +78,7 @@ class Pushing:
 def push(task: Task, commands: Floats, seed: int, steps: int = 32) -> Played:
     """Play (S, 5) commands of two velocities each; the same seed gives the same bits."""
     arm, camera = (np.random.default_rng([seed, i]) for i in range(2))
-    values, missing = {p.name: p.default for p in task.parameters} | dict(TRUE), laws()
+    values, missing = task.values(TRUE), laws()
     done = commands.copy()
     done[:, 0] += REPEATS_M * arm.standard_normal(len(commands))
     paths = play(Rig(values), done, steps * CONTROL_S + 0.06, scene.physics(values, missing))

@@ -53,7 +53,7 @@ def shoot(task: Task, condition: Condition, commands: Floats, seed: int, steps: 
     arm, air, camera = (np.random.default_rng([seed, i]) for i in range(3))
     done = commands + REPEATS * arm.standard_normal(commands.shape)
     done[:, 3] *= 1 + REPEATS_SPEED * arm.standard_normal(len(commands))
-    values = {p.name: p.default for p in task.parameters} | dict(TRUE)
+    values = task.values(TRUE)
     for puck in PUCKS:
         values[f"{puck}@dyna@mass"] *= condition.mass
     fan = FANS[condition.fan]
