@@ -12,13 +12,13 @@ from pathlib import Path
 import mujoco
 import yaml
 
-from compass_ros.targets.plain_mjcf import Delayed
+from compass_ros.targets.plain_mjcf import Command
 from compass_ros.targets.said import Said
 
 
-def write_control(model: mujoco.MjModel, delays: Sequence[Delayed], out: Path) -> tuple[Said, ...]:
+def write_control(model: mujoco.MjModel, commands: Sequence[Command], out: Path) -> tuple[Said, ...]:
     """Gains of each position servo on a joint; what has no place there is a comment and is said."""
-    late = {one.actuator: one for one in delays}
+    told = {one.actuator: one for one in commands}
     gains, said, comments = {}, [], []
     for a in range(model.nu):
         name, kp = model.actuator(a).name, float(model.actuator_gainprm[a, 0])
@@ -33,10 +33,13 @@ def write_control(model: mujoco.MjModel, delays: Sequence[Delayed], out: Path) -
             gains[joint]["u_clamp_max"] = float(model.actuator_forcerange[a, 1]) * gear
             gains[joint]["u_clamp_min"] = float(model.actuator_forcerange[a, 0]) * gear
         said.append(Said("servo", (joint,), "alike", "a PID at the controller's rate"))
-        of = late.get(name)
+        of = told.get(name)
         if of is not None and of.delay_s:
             comments.append(f"# {joint}: acts {of.delay_s:.4f} s late; ros2_control has no word for that")
             said.append(Said("delay of the command", (joint,), "left out", f"{of.delay_s:.4f} s"))
+        if of is not None and (of.scale != 1.0 or of.offset):
+            comments.append(f"# {joint}: give it {of.scale:.6g} * target + {of.offset:.6g}")
+            said.append(Said("factor and offset of the command", (joint,), "left out", "for the trajectory to have"))
     dofs = {
         "dof_names": list(gains),
         "command_interface": "effort",

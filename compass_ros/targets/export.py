@@ -10,8 +10,8 @@ from compass_ros.cells import Cell
 from compass_ros.errors import ConfigError
 from compass_ros.reporting.result_json import read_result
 from compass_ros.simulation.effects import read_effects
+from compass_ros.targets.commands import commands_of
 from compass_ros.targets.control import write_control
-from compass_ros.targets.delays import delays_of
 from compass_ros.targets.plain_mjcf import write_plain
 from compass_ros.targets.said import Said
 from compass_ros.targets.urdf import is_urdf, write_urdf
@@ -29,8 +29,8 @@ def export(folder: Path, cell: Cell, urdf: Path | None = None) -> dict[Path, tup
     scene = folder / "scene.xml"
     if not scene.is_file():
         raise ConfigError(f"{folder}: has no scene.xml; `compass calibrate` writes it beside result.json")
-    model, late = mujoco.MjModel.from_xml_path(str(scene)), delays_of(cell, values)
-    written = {folder / PLAIN: write_plain(scene, read_effects(folder / "effects.yaml"), late, folder / PLAIN)}
+    model, told = mujoco.MjModel.from_xml_path(str(scene)), commands_of(cell, values)
+    written = {folder / PLAIN: write_plain(scene, read_effects(folder / "effects.yaml"), told, folder / PLAIN)}
     source = urdf or (cell.model_path if is_urdf(cell.model_path) else None)
     if urdf is not None and not is_urdf(urdf):
         raise ConfigError(f"{urdf}: is no URDF; expected an XML document with <robot>")
@@ -38,5 +38,5 @@ def export(folder: Path, cell: Cell, urdf: Path | None = None) -> dict[Path, tup
     if source is not None:
         written[folder / URDF] = write_urdf(source, plain, folder / URDF)
     if model.nu:
-        written[folder / CONTROL] = write_control(model, late, folder / CONTROL)
+        written[folder / CONTROL] = write_control(model, told, folder / CONTROL)
     return written

@@ -10,21 +10,25 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from compass_ros.cells.rotors import PREFIX
 from compass_ros.simulation.effects import Exported, FittedEffect
+from compass_ros.simulation.effects.effect import Context
+from compass_ros.simulation.sites import Places
 from compass_ros.targets.said import Said
 
 
 @dataclass(frozen=True)
-class Delayed:
-    """A command that acts late, and what is added to it: parameters of a cell's input, no fields of a model."""
+class Command:
+    """An actuator that acts late on scale * command + offset: parameters of a cell's input, no fields of a model."""
 
     actuator: str
     delay_s: float = 0.0
+    scale: float = 1.0
     offset: float = 0.0
     """[unit of the command]"""
 
 
-def write_plain(scene: Path, exported: Exported, delays: Sequence[Delayed], out: Path) -> tuple[Said, ...]:
+def write_plain(scene: Path, exported: Exported, commands: Sequence[Command], out: Path) -> tuple[Said, ...]:
     """Read a written scene, add what MJCF can say, write it. Files of the scene are named as `scene` names them."""
     spec = mujoco.MjSpec.from_file(str(scene))
     said = [Said(f"friction of the table under {name}", (), "left out", "compass_ros.simulation.effects.attach has it")
@@ -36,8 +40,8 @@ def write_plain(scene: Path, exported: Exported, delays: Sequence[Delayed], out:
             said.append(Said(name, on, "left out", "MJCF has no word for it; attach() plays it"))
         else:
             said.append(write(spec, fitted))
-    for one in delays:
-        said += _late(spec, one)
+    for one in commands:
+        said += _told(spec, one)
     spec.compile()
     out.write_text(spec.to_xml(), encoding="utf-8")
     return tuple(said)
@@ -157,29 +161,78 @@ def _set_delay(spec: mujoco.MjSpec, actuator: mujoco.MjsActuator, delay_s: float
     actuator.interp = 1
 
 
-def _late(spec: mujoco.MjSpec, given: Delayed) -> list[Said]:
-    """The delay of a cell's input, and what is added to its command."""
+def _told(spec: mujoco.MjSpec, given: Command) -> list[Said]:
+    """What a cell's input does to a command, as the actuator's own."""
     actuator, said = spec.actuator(given.actuator), []
     if given.delay_s > 0:
         _set_delay(spec, actuator, given.delay_s)
         said.append(Said("delay of the command", (given.actuator,), "alike", "commands once a step, interpolated"))
+    gains, bias = np.array(actuator.gainprm, dtype=float), np.array(actuator.biasprm, dtype=float)
+    bias[0] += gains[0] * given.offset
+    gains[0] *= given.scale
+    actuator.gainprm, actuator.biasprm = gains, bias
     if given.offset:
-        bias = np.array(actuator.biasprm, dtype=float)
-        bias[0] += float(np.array(actuator.gainprm)[0]) * given.offset
-        actuator.biasprm = bias
-        said.append(Said("offset of the command", (given.actuator,), "exact"))
+        said.append(Said("offset of the command", (given.actuator,), "exact", _WITHIN))
+    if given.scale != 1.0:
+        said.append(Said("factor of the command", (given.actuator,), "exact", _WITHIN))
     return said
 
 
+def _quadratic(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
+    """Damping is a polynomial of the speed: its second number is that of |v| v."""
+    joints = _joints(spec, fitted)
+    if not joints:
+        return _no_joint(fitted)
+    for joint in joints:
+        damping = np.array(joint.damping, dtype=float)
+        if damping.size < 2:
+            return Said("quadratic_drag", fitted.attached.objects, "left out", "this MuJoCo has linear damping alone")
+        damping[1] += numbers(fitted)["coefficient"]
+        joint.damping = damping
+    return Said("quadratic_drag", fitted.attached.objects, "alike", "damping is integrated implicitly")
+
+
+def _between(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
+    """A law between a motor and its joint: what it makes of the compiled scene, which has the motor's side already."""
+    model, on = spec.compile(), fitted.attached.objects
+    if any(spec.joint(f"{PREFIX}{name}") is None for name in on):
+        return Said(fitted.attached.effect.name, on, "left out", "the scene has no motor's side of the joint")
+    places, drives = Places(model, frozenset()), model.actuator_trnid[:, 0].copy()
+    efforts = model.sensor_objid.copy()
+    context = Context(fitted.attached.sites(places), {}, (), (), float(model.opt.timestep))
+    if (law := fitted.attached.effect.model) is not None:
+        law(model, np.array(fitted.values), context)
+    for name in on:
+        tendon = spec.tendon(f"{PREFIX}{name}")
+        t = model.tendon(tendon.name).id
+        tendon.springlength, tendon.range = model.tendon_lengthspring[t], model.tendon_range[t]
+        tendon.limited, tendon.solref_limit = int(model.tendon_limited[t]), model.tendon_solref_lim[t]
+        for what, value in (("stiffness", model.tendon_stiffness[t]), ("damping", model.tendon_damping[t])):
+            given = np.array(getattr(tendon, what), dtype=float)
+            given.flat[0] = value
+            setattr(tendon, what, given if given.ndim else float(given))
+        for side in (name, f"{PREFIX}{name}"):
+            spec.joint(side).armature = float(model.dof_armature[model.joint(side).dofadr[0]])
+    for a in np.flatnonzero(model.actuator_trnid[:, 0] != drives):
+        spec.actuators[a].target = model.joint(int(model.actuator_trnid[a, 0])).name
+    for s in np.flatnonzero(model.sensor_objid != efforts):
+        spec.sensors[s].objname = model.joint(int(model.sensor_objid[s])).name
+    return Said(fitted.attached.effect.name, on, "exact", f"begin with {PREFIX}JOINT at the place of JOINT")
+
+
+_WITHIN = "where the command reaches no limit"
 _POINT = 1e-9
 """[kg m^2] Inertia of a point mass: MuJoCo wants some."""
 _WRITERS: Mapping[str, Callable[[mujoco.MjSpec, FittedEffect], Said]] = {
     "actuation_delay": _delay,
+    "backlash": _between,
     "coulomb_friction": _friction,
     "first_order_lag": _lag,
     "gain_error": _gain,
     "gravity_tilt": _tilt,
+    "joint_elasticity": _between,
     "payload": _payload,
+    "quadratic_drag": _quadratic,
     "spring": _spring,
     "viscous_drag": _viscous,
 }

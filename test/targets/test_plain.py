@@ -8,9 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from compass_ros.cells.rotors import add_rotors, rotors
 from compass_ros.simulation.effects import Attached, Exported, FittedEffect, attach, effect
 from compass_ros.simulation.sizes import unit_joint
-from compass_ros.targets.plain_mjcf import Delayed, write_plain
+from compass_ros.targets.plain_mjcf import Command, write_plain
 from compass_ros.types import Floats
 
 SCENE = """<mujoco><option timestep="0.0005" gravity="0 0 -9.81"/><worldbody>
@@ -27,13 +28,14 @@ LAWS = {
     "spring": (("elbow",), (1.5, 0.2, 0.0), 1e-6),
     "gravity_tilt": (("upper", "lower"), (0.05, -0.03), 1e-6),
     "payload": (("lower",), (0.4, 0.02, 0.01, -0.1), 1e-6),
+    "quadratic_drag": (("elbow",), (0.03,), 5e-3),
 }
 """Sites, numbers, and how far the two may be apart in 1.5 s of free swing [rad]."""
 
 
 def fitted(name: str, on: tuple[str, ...], values: tuple[float, ...]) -> FittedEffect:
     law = effect(name)
-    if law.on_joint is not None and name in ("coulomb_friction", "viscous_drag", "spring"):
+    if law.on_joint is not None and name in ("coulomb_friction", "viscous_drag", "quadratic_drag", "spring"):
         law = law.at(unit_joint("hinge"))
     return FittedEffect(Attached(law, on), values, tuple(np.nan for _ in values))
 
@@ -54,6 +56,8 @@ def swing(path: Path, controls: Floats, laws: Exported | None = None) -> Floats:
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
     data.qpos[:2], out = (0.6, -0.4), np.zeros((len(controls), 2))
+    for joint, rotor in rotors(model):
+        data.qpos[model.jnt_qposadr[rotor]] = data.qpos[model.jnt_qposadr[joint]]
 
     def play() -> Floats:
         for t, told in enumerate(controls):
@@ -118,11 +122,11 @@ def _lagged(told: Floats, time: float) -> Floats:
     return out
 
 
-def test_a_delayed_and_shifted_input_of_a_cell_is_said(scene: Path, tmp_path: Path) -> None:
-    said = write_plain(scene, exported(), (Delayed("servo", 0.04, 0.05),), tmp_path / "plain.xml")
-    assert [one.fate for one in said] == ["alike", "exact"]
+def test_an_input_of_a_cell_that_is_late_scaled_and_shifted_is_said(scene: Path, tmp_path: Path) -> None:
+    said = write_plain(scene, exported(), (Command("servo", 0.04, 1.1, 0.05),), tmp_path / "plain.xml")
+    assert [one.fate for one in said] == ["alike", "exact", "exact"]
     told, followed = commands(), commands()
-    followed[:, 0] = np.concatenate([np.zeros(80), told[:-80, 0]]) + 0.05
+    followed[:, 0] = 1.1 * np.concatenate([np.zeros(80), told[:-80, 0]]) + 0.05
     assert np.abs(swing(tmp_path / "plain.xml", told) - swing(scene, followed)).max() < 1e-6
 
 
@@ -132,3 +136,25 @@ def test_what_mjcf_has_no_word_for_is_left_out_and_said(scene: Path, tmp_path: P
     assert said.fate == "left out"
     assert "gravity_tilt on lower: left out" in said.line()
     assert (swing(tmp_path / "plain.xml", np.zeros((9, 2))) == swing(scene, np.zeros((9, 2)))).all()
+
+
+@pytest.mark.parametrize(("name", "numbers"), [("backlash", (0.05, 0.02)), ("joint_elasticity", (0.004, 0.02))])
+def test_what_is_between_a_motor_and_its_joint_is_plain_mjcf(
+    name: str, numbers: tuple[float, float], tmp_path: Path
+) -> None:
+    spec = mujoco.MjSpec.from_string(SCENE)
+    spec.joint("shoulder").armature = 0.05
+    add_rotors(spec, ["shoulder"])
+    spec.compile()
+    (tmp_path / "scene.xml").write_text(spec.to_xml(), encoding="utf-8")
+    laws = exported(fitted(name, ("shoulder",), numbers))
+    (said,) = write_plain(tmp_path / "scene.xml", laws, (), tmp_path / "plain.xml")
+    assert said.fate == "exact"
+    with_law = swing(tmp_path / "scene.xml", commands(), laws)
+    assert np.abs(with_law - swing(tmp_path / "plain.xml", commands())).max() < 1e-6
+    assert np.abs(with_law - swing(tmp_path / "scene.xml", commands())).max() > 1e-3
+
+
+def test_without_a_motor_s_side_play_is_left_out(scene: Path, tmp_path: Path) -> None:
+    (said,) = write_plain(scene, exported(fitted("backlash", ("shoulder",), (0.05, 0.02))), (), tmp_path / "plain.xml")
+    assert said.fate == "left out"

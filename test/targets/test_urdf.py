@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from compass_ros.targets.control import write_control
-from compass_ros.targets.plain_mjcf import Delayed
+from compass_ros.targets.plain_mjcf import Command
 from compass_ros.targets.urdf import write_urdf
 from compass_ros.types import Floats
 from test.conftest import Run
@@ -63,7 +63,7 @@ def test_a_written_urdf_accelerates_as_the_calibrated_model(tmp_path: Path) -> N
 
 def test_gains_of_a_controller_are_those_of_the_servo(tmp_path: Path) -> None:
     model = mujoco.MjModel.from_xml_string(SCENE)
-    said = write_control(model, (Delayed("servo", 0.04),), tmp_path / "pid.yaml")
+    said = write_control(model, (Command("servo", 0.04),), tmp_path / "pid.yaml")
     text = (tmp_path / "pid.yaml").read_text(encoding="utf-8")
     dofs = yaml.safe_load(text)["pid_controller"]["ros__parameters"]
     assert dofs["gains"] == {"shoulder": {"p": 30.0, "i": 0.0, "d": 1.0}}
