@@ -120,8 +120,10 @@ class Judge:
         sentence += DEPENDS[where.depends_on]
         if self.found.models:
             _, unknown, of_models = self.found.probabilities
-            best = self.found.models[0].name
-            sentence += f" (probability {unknown:.2f}; the best law, {best}, has {of_models[0]:.2g})"
+            best, plain = self.found.models[0], self.found.plain
+            was, now = plain.chi_square**0.5, best.chi_square**0.5
+            left = f"leaves {now:.1f} of {was:.1f} times the noise in fitted episodes"
+            sentence += f" (probability {unknown:.2f}; the best law, {best.name}, has {of_models[0]:.2g} and {left})"
         before = f"held-out error {1e3 * self._before:.2f} {unit}, floor {1e3 * self._floor:.2f} {unit}"
         return self._said("unknown", f"{sentence}; {before}.", self._of_discrepancy(where))
 
