@@ -2,7 +2,8 @@
 # What is already there is skipped.
 #
 #   make demo    the main job: a virtual robot cell plays shots, and the calibrator finds what is wrong with the simulator
-#   make test    ruff, mypy, all tests
+#   make test    ruff, mypy, all tests but the nightly ones
+#   make nightly tests of half a minute and more
 #   make prove   120 sealed worlds: conceal, calibrate blindly, unseal, count; goes on where it was stopped
 #   make league  recordings of others against answers written down before (docs/real-data.md); also `make real`
 #   make soak    half an hour of full load: memory, lost messages, latency; ARGS="--minutes 5" for less
@@ -33,7 +34,7 @@ READERS := test/readers
 RERUN   := .venv-rerun
 SITE    := .venv-site
 
-.PHONY: demo prove real league test lint bench bags readers install interfaces lock clean soak fuzz cells mutate ray engines wheel site
+.PHONY: demo prove real league test lint bench bags readers install interfaces lock clean soak nightly fuzz cells mutate ray engines wheel site
 .DELETE_ON_ERROR:
 
 demo: install
@@ -42,8 +43,12 @@ demo: install
 # Two test processes on two cores: linear algebra must not start threads of its own.
 test: export OMP_NUM_THREADS = 1
 test: lint readers
-	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not ros" $(ARGS)
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not ros and not nightly" $(ARGS)
 	$(BIN)/python -m pytest -m ros $(ARGS)
+
+# What takes half a minute and more, and is not the first to break.
+nightly: install readers
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist load -m nightly $(ARGS)
 
 soak: install
 	$(BIN)/python scripts/soak.py $(ARGS)

@@ -62,7 +62,8 @@ class StartSpec:
     """Frames of the track from which a first velocity is taken. Six show what a parabola gets wrong."""
     noise: Mapping[Literal["position", "velocity", "orientation", "rate"], Deviation] | None = None
     """Standard deviation of the first position [m or rad], velocity [m/s or rad/s], orientation [rad], rate [rad/s].
-    None: as exact as the frames from which it was read say; what the recording states is exact."""
+    What is not named, or None: as exact as the frames from which it was read say; what the recording states is exact. A
+    mapping without any: all of it is exact."""
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"), kw_only=True)
@@ -80,10 +81,9 @@ def input_names(spec: StartSpec, signal: Signal) -> tuple[str, ...]:
 
 def input_std(spec: StartSpec, signal: Signal) -> tuple[float, ...]:
     """Standard deviation of each of these inputs; NaN where the recording says it (`stated_error`, or a window)."""
-    if spec.noise is None:
-        return tuple(0.0 if name in _UNIT else math.nan for name in _names(signal))
-    given: Mapping[str, float] = dict(spec.noise)  # type: ignore[arg-type]
-    of_name = {name: given.get(group, 0.0) for group, names in _GROUPS.items() for name in names}
+    given: Mapping[str, float] = dict(spec.noise or {})  # type: ignore[arg-type]
+    unsaid = 0.0 if spec.noise == {} else math.nan
+    of_name = {name: given.get(group, unsaid) for group, names in _GROUPS.items() for name in names}
     return tuple(float(of_name.get(name.rpartition(".")[2], 0.0)) for name in _names(signal))
 
 
@@ -175,8 +175,9 @@ def stated_error(spec: StartSpec, signal: Signal, episode: Episode, noise: float
     """
     if len(episode.initial_state.get(spec.object, ())) == len(state_names(signal)):
         return np.zeros(len(_names(signal)))
-    form = _form_error(spec, signal, episode, noise)
-    return form if spec.noise is not None else np.hypot(form, _read_error(spec, signal, episode, noise))
+    unsaid = np.isnan(input_std(spec, signal))
+    form, read = (of(spec, signal, episode, noise) for of in (_form_error, _read_error))
+    return np.where(unsaid, np.hypot(form, read), form)
 
 
 def _read_error(spec: StartSpec, signal: Signal, episode: Episode, noise: float) -> Floats:
@@ -207,7 +208,8 @@ def _form_error(spec: StartSpec, signal: Signal, episode: Episode, noise: float)
     """(A,) error of the first state that a track says: no motion is a parabola.
 
     What a cubic through the same frames says differently, of six or more. Where the scatter about the parabola is no
-    noise, FORM times that or what the scatter does to the coefficients (Birge 1932). Of a pose's turn nothing is known.
+    noise, FORM times that or what the scatter does to the coefficients (Birge 1932). Of a turn that is taken for steady,
+    what a steady change of it says differently.
     """
     out = np.zeros(len(_names(signal)))
     if spec.velocity == "rest":
@@ -223,12 +225,20 @@ def _form_error(spec: StartSpec, signal: Signal, episode: Episode, noise: float)
     first, size = positions_in_state(signal), linear.shape[1]
     out[:size] = 0.0 if episode.initial_state.get(spec.object) else error[0]
     out[first : first + size] = error[1]
+    if signal.quantity == "pose" and len(time) >= 5:
+        out[first + size : first + size + 3] = np.abs(np.subtract(*_angular_velocities(time, value[:, 3:])))
     return out
 
 
 def _angular_velocity(time: Floats, quaternion: Floats) -> Floats:
     """(3,) rate in the body's frame [rad/s] by least squares over the rotation from the first frame."""
+    return _angular_velocities(time, quaternion)[0]
+
+
+def _angular_velocities(time: Floats, quaternion: Floats) -> tuple[Floats, Floats]:
+    """(3,) of a turn that is steady, and of one that changes steadily."""
     rotation = Rotation.from_quat(quaternion[:, [1, 2, 3, 0]])
     turned = (rotation[0].inv() * rotation).as_rotvec()
     since = time - time[0]
-    return np.asarray(since @ turned / np.sum(since**2))
+    changing = np.linalg.lstsq(np.stack([since, since**2], axis=1), turned, rcond=None)[0]
+    return np.asarray(since @ turned / np.sum(since**2)), np.asarray(changing[0])

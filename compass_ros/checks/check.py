@@ -64,8 +64,7 @@ def check(cell: Cell, episodes: Sequence[Episode]) -> Checked:
     findings = units(cell, named, of, float(model.stat.extent)) + _frames(cell, named)
     signals = _looked(named, of, {one.signal for one in findings if one.kind == "units"})
     findings += [one for signal in signals.values() for one in signal.findings]
-    seen = [part for signal in signals.values() for part in signal.parts if not part.part.turns]
-    found = windows(cell, _mended(named, signals), seen, {name for one in findings for name in _wrong(one)})
+    found = windows(cell, _mended(named, signals), signals, {name for one in findings for name in _wrong(one)})
     findings += found.findings
     if len(found.still) == len(named) and not (cell.action or cell.spec.inputs):
         raise DataError(f"no recording holds a motion: {findings[-1].sentence}")

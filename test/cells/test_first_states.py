@@ -132,3 +132,37 @@ def test_so_is_the_first_pose_of_a_body(tmp_path: Path) -> None:
     half = scatter["cube.qx"]
     assert said["cube.rx"] == pytest.approx(2 * half, rel=0.12)
     assert said["cube.qw"] == 0.0
+
+
+@pytest.mark.parametrize("stated", [{"position": 0.002}, {"position": 0.002, "velocity": 0.05}, {"rate": 0.5}])
+def test_what_the_cell_does_not_name_is_as_exact_as_the_frames(tmp_path: Path, stated: dict[str, float]) -> None:
+    start = {"object": "cube", "frames": 6}
+    mass = parameter("cube@dyna@mass", "body_mass", "cube", 0.37, 0.1)
+    cells = [
+        written(tmp_path, TOSS, content([{"name": "cube", "quantity": "pose"}], [mass], start=[start | noise]))
+        for noise in ({"noise": stated}, {}, {"noise": {}})
+    ]
+    still = np.tile([0.1, 0.2, 0.5, 1.0, 0.0, 0.0, 0.0], (30, 1))
+    stamps = BEGUN + np.round(TIME[:30] * 1e9).astype(np.int64)
+    episode = Episode("e", "cell", "", {}, BEGUN, (Track("cube", "pose", stamps, still),), {})
+    some, frames, exact = (dict(zip(of.input_names, std(of, episode), strict=True)) for of in cells)
+    groups = {"position": "x", "velocity": "vx", "orientation": "rx", "rate": "wx"}
+    for group, name in groups.items():
+        assert some[f"cube.{name}"] == pytest.approx(stated.get(group, frames[f"cube.{name}"]))
+        assert frames[f"cube.{name}"] > 0
+        assert exact[f"cube.{name}"] == 0.0
+
+
+@pytest.mark.parametrize("change", [0.0, 20.0, -60.0])
+def test_a_turn_that_changes_is_read_as_wrong_as_it_says(tmp_path: Path, change: float) -> None:
+    """Rate 1 rad/s about z, and so much more in each second."""
+    mass = parameter("cube@dyna@mass", "body_mass", "cube", 0.37, 0.1)
+    start = {"object": "cube", "frames": 6}
+    of = written(tmp_path, TOSS, content([{"name": "cube", "quantity": "pose"}], [mass], start=[start], noise_m=1e-5))
+    time = TIME[:30]
+    turned = Rotation.from_rotvec((time + 0.5 * change * time**2)[:, None] * np.array([0.0, 0.0, 1.0])).as_quat()
+    value = np.concatenate([np.zeros((30, 3)), turned[:, [3, 0, 1, 2]]], axis=1)
+    stamps = BEGUN + np.round(time * 1e9).astype(np.int64)
+    episode = Episode("e", "cell", "", {}, BEGUN, (Track("cube", "pose", stamps, value),), {})
+    read, said = (dict(zip(of.input_names, one, strict=True)) for one in (of.inputs(episode), std(of, episode)))
+    assert said["cube.wz"] == pytest.approx(abs(read["cube.wz"] - 1.0), abs=2e-3)
