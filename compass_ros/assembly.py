@@ -9,14 +9,12 @@ from importlib.metadata import version
 import numpy as np
 
 from compass_ros.calibration.identifiability import IDENTIFIED
-from compass_ros.calibration.noise import Noise
 from compass_ros.cells import Cell
 from compass_ros.cells.signals import Signal
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery
 from compass_ros.discovery.floor import honest
-from compass_ros.posing import Yardstick, noise_floor
-from compass_ros.simulation import Simulator
+from compass_ros.posing import Posed, noise_floor
 from compass_ros.simulation.replay import Recordings, Replay
 from compass_ros.types import Budget, Estimate, Floats, Gap, Graph, Mismatch, ParameterRow, ReplayedTrack, Result
 from compass_ros.types import Replay as Drawn
@@ -25,16 +23,13 @@ from compass_ros.types import Replay as Drawn
 def assemble(
     cell: Cell,
     config: CalibrationConfig,
-    simulator: Simulator,
-    data: Recordings,
-    judge: Recordings,
+    posed: Posed,
     held_out: bool,
-    noise: Noise,
     estimate: Estimate,
     found: Discovery,
-    yardsticks: tuple[Yardstick, Yardstick] | None = None,
 ) -> Result:
-    """Gaps on all episodes for each model, tables and drawings. `yardsticks`: of what is fitted, of what judges."""
+    """Gaps on all episodes for each model, tables and drawings."""
+    simulator, data, judge, noise = posed.simulator, posed.data, posed.judge, posed.noise
     values = found.parameters if found.parameters is not None else estimate.values
     alone = np.full(len(values), np.nan) if found.parameters is None else estimate.values
     std, identifiable = estimate.std, estimate.identifiable
@@ -45,9 +40,8 @@ def assemble(
     if found.simulator is not None and found.values is not None:
         models["with_effects"] = (found.simulator, found.values)
     own, replays, gap = (found.noise or noise).rms, {}, dict[str, dict[str, Gap]]()
-    of_cell = yardsticks or (Yardstick(simulator, data, noise), Yardstick(simulator, judge, noise))
     for name, (s, v) in models.items():
-        fit, unseen = of_cell if s is simulator else (Yardstick(s, data, noise), Yardstick(s, judge, noise))
+        fit, unseen = posed.yardsticks if s is simulator else replace(posed, simulator=s).yardsticks
         replays[name] = fit.replay(v), unseen.replay(v), v
         gap[name] = {"fit": fit.gap(v, own)} | ({"held_out": unseen.gap(v, own)} if held_out else {})
     floor = noise_floor(cell, found.noise or noise)

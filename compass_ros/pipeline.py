@@ -9,9 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from compass_ros.assembly import assemble
-from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.noise import Noise, measure_noise
-from compass_ros.calibration.problem import Problem
+from compass_ros.calibration.noise import measure_noise
 from compass_ros.calibration.refine import Refined, refine
 from compass_ros.cells import Cell
 from compass_ros.checks.check import check
@@ -19,7 +17,7 @@ from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery, data_bad, discover, fit_failed, not_evaluated
 from compass_ros.errors import DataError
 from compass_ros.estimation import estimate_parameters
-from compass_ros.posing import Yardstick, pose
+from compass_ros.posing import Posed
 from compass_ros.progress import Steady
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import recordings
@@ -30,6 +28,8 @@ Keep = Callable[[Result, Discovery], object]
 """Takes a calibration before the search for missing physics begins: whatever happens to that, it stands."""
 CALIBRATION = 0.7
 """Share of the progress that is the calibration's where physics is looked for after it: about its share of the time."""
+READ = 3
+"""How often it is asked at most how wrong the first states are that were read off a track: a budget."""
 
 
 def calibrate(
@@ -51,8 +51,8 @@ def calibrate(
     told: list[str] = []
     left_out = (*checked.left_out, *without_motion)
 
-    def noted(result: Result) -> Result:
-        return replace(result, warnings=(*told, *checked.said, *result.warnings), left_out=left_out)
+    def noted(one: Result) -> Result:
+        return replace(one, warnings=(*told, *checked.said, *one.warnings), left_out=left_out)
 
     fit, held_out = split(used, config)
     most = config.windows if cell.spec.windows else config.episodes
@@ -60,10 +60,17 @@ def calibrate(
     judge = recordings(cell, evenly(windows(cell, held_out or fit), config.episodes)).numbered(len(data.names))
     simulator = simulator.driven(data.drives + judge.drives)
     noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
-    yardsticks = Yardstick(simulator, data, noise), Yardstick(simulator, judge, noise)
-    problem, unseen = pose(simulator, data, noise, yardsticks[0]), pose(simulator, judge, noise).likelihood
+    posed = Posed(simulator, data, judge, noise)
+    estimate, refined = estimate_parameters(posed.problem, config, steady.share(0.0, first))
+    for _ in range(READ):
+        if (wider := posed.wider(refined)) is None:
+            break
+        posed = wider
+        estimate, refined = estimate_parameters(posed.problem, config, steady.share(0.0, first))
 
-    estimate, refined = estimate_parameters(problem, config, steady.share(0.0, first))
+    def result(found: Discovery) -> Result:
+        return assemble(cell, config, posed, bool(held_out), estimate, found)
+
     if checked.bad:
         found = data_bad(checked.sentence)
     elif not config.discover:
@@ -71,32 +78,23 @@ def calibrate(
     else:
         if keep is not None:
             begun = not_evaluated("the search has not ended")
-            known = assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, begun, yardsticks)
-            keep(noted(known), begun)
-        found = searched(simulator, problem, estimate, refined, unseen, noise, config, steady.share(first, 1.0))
-    result = assemble(cell, config, simulator, data, judge, bool(held_out), noise, estimate, found, yardsticks)
+            keep(noted(result(begun)), begun)
+        found = searched(posed, estimate, refined, config, steady.share(first, 1.0))
     if estimate.note:
         told.append(estimate.note)
     if len(used) < len(sound):
         said = f"{len(used)} of {len(sound)} episodes were used, evenly over the order of recording"
         told.append(f"{said}; the option `episodes` takes more")
-    return noted(result), found
+    return noted(result(found)), found
 
 
 def searched(
-    simulator: Simulator,
-    problem: Problem,
-    estimate: Estimate,
-    refined: Refined | None,
-    unseen: Likelihood,
-    noise: Noise,
-    config: CalibrationConfig,
-    report: Report,
+    posed: Posed, estimate: Estimate, refined: Refined | None, config: CalibrationConfig, report: Report
 ) -> Discovery:
     """What is missing, or why that cannot be said: the calibration stands either way."""
     try:
-        refined = refined or refine(problem.likelihood, estimate.values)
-        return discover(simulator, refined, unseen, noise, config.false_alarm, config.seed, report)
+        refined = refined or refine(posed.problem.likelihood, estimate.values)
+        return discover(posed.simulator, refined, posed.unseen, posed.noise, config.false_alarm, config.seed, report)
     except DataError as error:
         return not_evaluated(str(error))
     except np.linalg.LinAlgError as error:

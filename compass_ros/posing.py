@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 
+from compass_ros.calibration.launches import unexpected, with_launches
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.problem import Problem
-from compass_ros.calibration.refine import with_launches
+from compass_ros.calibration.refine import Refined
 from compass_ros.cells import Cell
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.factors import factor_distance
@@ -79,6 +80,48 @@ def pose(simulator: Simulator, data: Recordings, noise: Noise, yardstick: Yardst
         distance=(yardstick or Yardstick(simulator, data, noise)).distance,
         likelihood=likelihood,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """Recordings to fit and recordings to judge by, with the simulator that they are compared with."""
+
+    simulator: Simulator
+    data: Recordings
+    judge: Recordings
+    noise: Noise
+
+    @cached_property
+    def yardsticks(self) -> tuple[Yardstick, Yardstick]:
+        """Of what is fitted, of what judges."""
+        return Yardstick(self.simulator, self.data, self.noise), Yardstick(self.simulator, self.judge, self.noise)
+
+    @cached_property
+    def problem(self) -> Problem:
+        return pose(self.simulator, self.data, self.noise, self.yardsticks[0])
+
+    @cached_property
+    def unseen(self) -> Likelihood:
+        return pose(self.simulator, self.judge, self.noise, self.yardsticks[1]).likelihood
+
+    def wider(self, refined: Refined | None) -> Posed | None:
+        """The same where first states that were read off a track may be as wrong as a fit found them; None: they are
+        not more wrong than was expected.
+
+        How exact a cell calls its first states stands, unless the frames alone said more. So do windows' first states.
+        """
+        stated, read = self.simulator.cell.launch_std, self.data.start_std
+        own = ~(stated >= read) & (read > 0)
+        if refined is None or self.simulator.cell.spec.windows is not None or not own.any():
+            return None
+        found = unexpected(refined.likelihood, refined.fit)[: len(own)]
+        own &= found > 0
+        if not own.any():
+            return None
+        more = np.sqrt(np.maximum(found**2 - np.nan_to_num(stated) ** 2, read**2))
+        std = np.where(own, more, read)
+        data, judge = (replace(r, start_std=std) for r in (self.data, self.judge))
+        return replace(self, data=data, judge=judge)
 
 
 def launched(simulator: Simulator, data: Recordings, noise: Noise, values: Floats) -> Replay:

@@ -16,7 +16,7 @@ from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery, not_evaluated
 from compass_ros.errors import DataError
 from compass_ros.pipeline import calibrate, evenly, split
-from compass_ros.posing import launched, noise_floor
+from compass_ros.posing import Posed, launched, noise_floor
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import Replay, recordings
 from compass_ros.types import Episode, Estimate, Progress, Result, Track
@@ -254,7 +254,7 @@ def test_what_an_effect_makes_unsure_is_not_called_identifiable(episodes: list[E
     noise = measure_noise(data.time_s, data.measured, own.spec.noise_m)
 
     def identifiable(found: Discovery) -> list[bool]:
-        result = assemble(own, CONFIG, alone, data, data, False, noise, estimate, found)
+        result = assemble(own, CONFIG, Posed(alone, data, data, noise), False, estimate, found)
         return [row.identifiable for row in result.parameters]
 
     assert all(identifiable(beside))

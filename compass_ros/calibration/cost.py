@@ -13,6 +13,9 @@ import numpy as np
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.types import Floats
 
+ROBUST = 4.0
+"""Scale of the loss [sigma]: Gaussian noise is hardly touched, a swapped or lost frame hardly counts."""
+
 
 @dataclass(frozen=True)
 class Point:
@@ -51,6 +54,14 @@ def robust_loss(residual: Floats, robust: float) -> Floats:
 def robust_weight(residual: Floats, robust: float) -> Floats:
     """Factor of each squared residual that gives the robust loss's gradient: 1 where small, falling where large."""
     return np.asarray(1 / np.sqrt(1 + (residual / robust) ** 2))
+
+
+def cost_by_episode(likelihood: Likelihood, point: Point, residual: Floats, robust: float) -> Floats:
+    """(E,) what each episode adds to the cost: its (F, C) residuals and its launch."""
+    random = likelihood.launch_std > 0
+    launch = point.launch[:, random] / likelihood.launch_std[random]
+    of_frames = robust_loss(residual, robust).reshape(len(residual), -1).sum(axis=1)
+    return np.asarray(0.5 * (of_frames + np.sum(launch**2, axis=1)))
 
 
 def _prior(likelihood: Likelihood, point: Point) -> float:

@@ -22,6 +22,10 @@ _AS_HOPED, _EASIER = 0.9, 0.1
 where the linear model holds, damping only shortens the step."""
 
 
+NONE: Ints = np.zeros(0, dtype=np.int64)
+"""No parameters."""
+
+
 @dataclass(frozen=True)
 class Fit:
     """Result of `minimise`."""

@@ -12,18 +12,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compass_ros.calibration.cost import Point, start
+from compass_ros.calibration.cost import ROBUST, Point, start
 from compass_ros.calibration.differences import Linear, difference_steps, linearise
 from compass_ros.calibration.identifiability import WIDER, alone
-from compass_ros.calibration.least_squares import Fit, minimise
+from compass_ros.calibration.launches import relaunched
+from compass_ros.calibration.least_squares import NONE, Fit, minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.residuals import chi_square, covariance, information_share, typical_residual
 from compass_ros.calibration.screen import WORTH, acting, coupling, independent, many
-from compass_ros.calibration.settle import settled
+from compass_ros.calibration.settle import SETTLED, settled
 from compass_ros.types import Floats, Ints
 
-OF_WINDOWS = 2
-"""Gauss-Newton steps for the first states of windows: within their noise the motion is linear in them."""
 SMOOTH = 1.01
 """Growth of sigma by the simulator's roughness up to which differences of one length are as good as of another."""
 FELT = 2.0
@@ -35,17 +34,12 @@ FELT_SHARE, STRONG_SHARE = 1e-3, 0.02
 share of variance that makes an edge."""
 COARSE = 0.3
 """How far a parameter is moved to see whether it is felt, in prior widths."""
-ROBUST = 4.0
-"""Scale of the loss [sigma]: Gaussian noise is hardly touched, a swapped or lost frame hardly counts."""
 
 CALM = 300.0
 """Movement of a frame by one prior width [sigma] above which it is trusted less; ordinary shots stay below."""
 
 SMALL = 0.3
 """Size of the changes that show the simulator's roughness, in steps of the differences: curvature must not count."""
-
-NONE: Ints = np.zeros(0, dtype=np.int64)
-"""No parameters."""
 
 Watch = Callable[[str, float, Point], bool]
 """(stage, share of the refinement done, where it stands) -> whether to go on."""
@@ -170,6 +164,9 @@ def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True)
     linear = scaled(fit.linear, likelihood, rough)
     smooth = likelihood.windowed and bool(np.max(rough.sigma / likelihood.sigma) < SMOOTH)
     fit = settled(rough, replace(fit, linear=linear, robust=ROBUST), rounds=1 if smooth else 2)
+    point = relaunched(rough, fit)
+    if point.cost < fit.point.cost - SETTLED:
+        fit = settled(rough, replace(fit, point=point))
     watch("refine", 1.0, fit.point)
     return concluded(rough, fit, influence)
 
@@ -271,22 +268,6 @@ def with_roughness(likelihood: Likelihood, fit: Fit, draws: int = 6) -> Likeliho
     spread = np.sqrt(np.mean(beyond**2, axis=0)) * likelihood.sigma
     grown = np.maximum.accumulate(spread, axis=1)  # roughness never heals
     return replace(likelihood, sigma=np.hypot(likelihood.sigma, grown))
-
-
-def with_launches(likelihood: Likelihood, values: Floats) -> Point:
-    """(P,) values that stay as they are, each episode with the launch that agrees best with it.
-
-    On a horizon that grows as the fit's does, and for its reason.
-    """
-    point = start(likelihood, values)
-    if not likelihood.launch_std.any():
-        return point
-    most = OF_WINDOWS if likelihood.windowed else 12
-    for share in likelihood.horizons:
-        part = likelihood.until(share * float(likelihood.time_s.max()))
-        robust = max(ROBUST, 3.0 * typical_residual(part, point))
-        point = minimise(part, point, NONE, most, robust, tolerance=1.0, fresh=False).point
-    return point
 
 
 def standard_errors(refined: Refined) -> tuple[Ints, Floats]:

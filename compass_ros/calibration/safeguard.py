@@ -12,17 +12,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from compass_ros.calibration.cost import Point, start
+from compass_ros.calibration.cost import ROBUST, Point, start
+from compass_ros.calibration.launches import with_launches
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import (
-    ROBUST,
     Refined,
     calmed,
     concluded,
     freed,
     polish,
     scaled,
-    with_launches,
     with_roughness,
 )
 from compass_ros.types import Floats

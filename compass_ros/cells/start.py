@@ -208,8 +208,8 @@ def _form_error(spec: StartSpec, signal: Signal, episode: Episode, noise: float)
     """(A,) error of the first state that a track says: no motion is a parabola.
 
     What a cubic through the same frames says differently, of six or more. Where the scatter about the parabola is no
-    noise, FORM times that or what the scatter does to the coefficients (Birge 1932). Of a turn that is taken for steady,
-    what a steady change of it says differently.
+    noise, FORM times that or what the scatter does to the coefficients (Birge 1932). Of a rate that is taken for
+    steady, what one that changes says differently.
     """
     out = np.zeros(len(_names(signal)))
     if spec.velocity == "rest":

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from compass_ros.calibration.launches import with_launches
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
-from compass_ros.calibration.refine import with_launches
 from compass_ros.cells import Cell
 from compass_ros.discovery.maps import TableMap
 from compass_ros.simulation import Simulator

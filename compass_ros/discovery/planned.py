@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from compass_ros.calibration.cost import start
+from compass_ros.calibration.cost import ROBUST, start
 from compass_ros.calibration.differences import linearise
 from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import ROBUST, scaled, with_roughness
+from compass_ros.calibration.refine import scaled, with_roughness
 from compass_ros.cells import Cell
 from compass_ros.discovery.response import Response, respond
 from compass_ros.errors import ConfigError, DataError

@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from compass_ros.calibration.cost import Point
-from compass_ros.calibration.least_squares import Fit, minimise
+from compass_ros.calibration.launches import spreads
+from compass_ros.calibration.least_squares import minimise
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.residuals import covariance
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.evidence import evidences, log_sum
 from compass_ros.discovery.first_order import SIGMAS, Ranked
@@ -71,16 +71,8 @@ def with_scatter(parent: Hypothesis, ranked: Ranked) -> Hypothesis:
     for _ in range(TURNS):
         likelihood, point = _spread(likelihood, point, spread)
         fit = minimise(likelihood, point, parent.fit.free, ITERATIONS, parent.fit.robust, 1.0)
-        point, spread = fit.point, found_spread(likelihood, fit)
+        point, spread = fit.point, float(spreads(likelihood, fit)[-1])
     return Hypothesis((*parent.laws, attached), simulator, likelihood, fit, without=parent.bare)
-
-
-def found_spread(likelihood: Likelihood, fit: Fit) -> float:
-    """Standard deviation of the deviations: of what was found and of what is not known of it."""
-    deviation = fit.point.launch[:, -1]
-    launches = int(np.sum(likelihood.launch_std > 0))
-    unsure = np.diag(covariance(likelihood, fit))[len(fit.free) + launches - 1 :: launches]
-    return float(np.sqrt(np.mean(deviation**2 + unsure * likelihood.launch_std[-1] ** 2)))
 
 
 def _spread(likelihood: Likelihood, point: Point, spread: float) -> tuple[Likelihood, Point]:

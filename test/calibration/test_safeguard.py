@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from compass_ros.calibration.causal_map import causal_map_refined
+from compass_ros.calibration.launches import with_launches
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.problem import Problem
-from compass_ros.calibration.refine import refine, standard_errors, with_launches
+from compass_ros.calibration.refine import refine, standard_errors
 from compass_ros.types import Floats, Ints, silent
 from test.calibration.toys import likelihood, oscillation
 

@@ -138,9 +138,10 @@ def test_so_is_the_first_pose_of_a_body(tmp_path: Path) -> None:
 def test_what_the_cell_does_not_name_is_as_exact_as_the_frames(tmp_path: Path, stated: dict[str, float]) -> None:
     start = {"object": "cube", "frames": 6}
     mass = parameter("cube@dyna@mass", "body_mass", "cube", 0.37, 0.1)
+    noises: list[dict[str, object]] = [{"noise": stated}, {}, {"noise": {}}]
     cells = [
         written(tmp_path, TOSS, content([{"name": "cube", "quantity": "pose"}], [mass], start=[start | noise]))
-        for noise in ({"noise": stated}, {}, {"noise": {}})
+        for noise in noises
     ]
     still = np.tile([0.1, 0.2, 0.5, 1.0, 0.0, 0.0, 0.0], (30, 1))
     stamps = BEGUN + np.round(TIME[:30] * 1e9).astype(np.int64)

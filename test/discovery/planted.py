@@ -8,11 +8,10 @@ from functools import cache
 
 import numpy as np
 
-from compass_ros.calibration.cost import Point, start
+from compass_ros.calibration.cost import ROBUST, Point, start
 from compass_ros.calibration.differences import linearise
 from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import ROBUST
 from compass_ros.discovery.candidates import Candidate, candidates
 from compass_ros.discovery.hypothesis import Hypothesis, widened
 from compass_ros.discovery.planned import perfect

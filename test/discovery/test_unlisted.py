@@ -9,10 +9,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from compass_ros.calibration.cost import start
+from compass_ros.calibration.cost import ROBUST, start
 from compass_ros.calibration.differences import linearise
 from compass_ros.calibration.least_squares import Fit
-from compass_ros.calibration.refine import ROBUST
 from compass_ros.cells import Cell
 from compass_ros.cells.auto import with_auto
 from compass_ros.config import CalibrationConfig

@@ -8,11 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from compass_ros.calibration.cost import Point, start
+from compass_ros.calibration.cost import ROBUST, Point, start
 from compass_ros.calibration.differences import linearise
 from compass_ros.calibration.least_squares import Fit, minimise
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import ROBUST
 from compass_ros.cells import load
 from compass_ros.cells.drives import Drive
 from compass_ros.discovery.candidates import Candidate
