@@ -26,7 +26,7 @@ def run(world: Planted, config: CompassConfig, seed: int = 0, report: Report = s
     return compass(world.differences, world.actions, world.parameters, FACTORS, start, config, seed, report)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(("noise", "seed"), [(0.05, 1)])
 def test_finds_eight_causes_among_sixty_four_and_closes_the_gap(noise: float, seed: int) -> None:
     world = planted(64, 8, noise=noise, seed=seed)

@@ -71,7 +71,7 @@ def short_trainings(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(npdr, name, value)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", RIVALS)
 def test_a_rival_closes_the_gap_pays_and_repeats(name: str) -> None:
     meter = Meter(planted(3, 3, episodes=4, seed=1))

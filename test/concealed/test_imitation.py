@@ -37,7 +37,7 @@ def test_the_library_s_own_formula_is_found_exactly(name: str) -> None:
         assert found.numbers["k1"] == pytest.approx(0.05 * own.ingredient.size * own.ingredient.shape["hand"], rel=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_trajectories_are_met_better_than_by_accelerations() -> None:
     own = strength("viscous_drag")
     played = table().play([own.ingredient])
@@ -60,7 +60,7 @@ def test_a_law_of_contacts_is_no_formula_of_forces() -> None:
     assert ideal(own, judge(), table().play([own.ingredient])) is None
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_law_that_has_a_formula_of_the_library_is_imitated_by_it() -> None:
     own = strength("quadratic_drag", other=0.0)
     found = best_imitation(own, judge(), places(judge().base), table().play([own.ingredient]))
@@ -68,7 +68,7 @@ def test_a_law_that_has_a_formula_of_the_library_is_imitated_by_it() -> None:
     assert found.left_m < 0.01 * TARGET_M
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_field_is_imitated_where_it_lies() -> None:
     """Drawn places alone lead to a fan here, which leaves 0.8 mm."""
     base = judge().base

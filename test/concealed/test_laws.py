@@ -59,7 +59,7 @@ def test_the_same_draw_gives_the_same_shape(name: str, base: Played) -> None:
     assert ingredient(name, base, seed=7).shape == ingredient(name, base, seed=7).shape
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", sorted(KNOWN))
 def test_with_the_formula_of_the_library_it_does_what_the_library_does(name: str, base: Played) -> None:
     own = _modest(ingredient(name, base, other=0.0), base)

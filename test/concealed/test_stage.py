@@ -52,7 +52,7 @@ def test_the_pusher_and_the_bias_of_the_camera_are_drawn_too() -> None:
     assert angle == pytest.approx(0.04, abs=0.002)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_is_drawn_repeats_is_strong_enough_and_reads_back(tmp_path: Path) -> None:
     own = cell()
     answer: Any = draw(own, INPUTS, 3, own.defaults, "table_tilt")

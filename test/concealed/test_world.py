@@ -59,7 +59,7 @@ def test_the_same_seed_gives_the_same_bits(tilted: World) -> None:
         assert one.action == other.action
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_effect_is_as_strong_as_asked_and_moves_more_before_parameters_swallow_it(tilted: World) -> None:
     (effect,) = effects(tilted)
     assert effect["rms_m"] == pytest.approx(ASKED_M, rel=0.06)
@@ -68,7 +68,7 @@ def test_an_effect_is_as_strong_as_asked_and_moves_more_before_parameters_swallo
     assert np.hypot(tilts["tilt_x"], tilts["tilt_y"]) == pytest.approx(1e-3 * effect["size"], rel=0.15)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_world_with_and_without_an_effect_differ_by_the_effect_alone(tilted: World, untouched: World) -> None:
     """Same parameters, shots and frames; what differs is what the answer says."""
     assert tilted.answer["parameters"] == untouched.answer["parameters"]
@@ -93,13 +93,13 @@ def test_parameters_are_wrong_within_their_half_widths(untouched: World) -> None
     assert all(p.low <= found[p.name] <= p.high for p in cell().parameters)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_a_finer_clock_leaves_after_the_parameters_is_small(untouched: World) -> None:
     numerics: Any = untouched.answer["numerics_rms_m"]
     assert numerics < 0.3e-3
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("rms_m", [ASKED_M, 6e-3])  # 6 mm are 56 ms: much more than a small step can tell
 def test_latency_of_the_camera_and_delay_of_the_arm_are_twins(rms_m: float) -> None:
     (effect,) = effects(sure(Wishes(5, names=("camera_latency",), rms_m=rms_m)))

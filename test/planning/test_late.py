@@ -91,13 +91,13 @@ def alike(name: str) -> float:
     return float(cosines(known, known.of_effects()[0])[0, 1])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_without_encoders_they_are_twins_and_with_them_hardly_alike() -> None:
     assert alike("air_hockey") > 0.999
     assert alike("air_hockey_encoders") < 0.5
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("planted", LATE)
 def test_encoders_say_which_it_is(planted: str) -> None:
     other = next(law for law in LATE if law != planted)
@@ -108,7 +108,7 @@ def test_encoders_say_which_it_is(planted: str) -> None:
     assert of_other - cost > 1000
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_measured_path_takes_a_late_arm_as_it_was_and_leaves_a_late_camera() -> None:
     late_arm, late_camera = (seen("air_hockey_tool", law) for law in LATE[::-1])
     plain, (cost, size) = fitted(late_arm)[0], fitted(late_arm, "camera_latency")

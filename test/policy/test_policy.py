@@ -139,7 +139,7 @@ class Walk:
         return self.look(), -np.abs(self.at - 0.6) if self.time == self.horizon else np.zeros(self.count)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_policy_over_time_reaches_its_goal(tmp_path: Path) -> None:
     policy = sac.learn(Walk(), 3200, 0)
     policy.save(tmp_path / "policy.npz")

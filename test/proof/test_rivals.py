@@ -116,7 +116,7 @@ def test_worlds_are_run_again_when_the_rivals_change(tmp_path: Path, monkeypatch
     assert len(read(path)) == 2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_sealed_world_through_a_rival() -> None:
     suite = Suite("off centre", ("--effect", "off_centre_mass", "--rms", "6e-3"), 3)
     found: Any = rivals.run(suite, 3, 1, ["calibrated"])

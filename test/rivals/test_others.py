@@ -22,7 +22,7 @@ def bent(shots: Shots) -> Shots:
     return replace(shots, data=replace(shots.data, measured=shots.data.measured + moved))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_gaussian_process_learns_a_smooth_residual() -> None:
     plain = played()
     given = replace(plain, fit=bent(plain.fit), held_out=bent(plain.held_out))
@@ -40,7 +40,7 @@ def test_a_gaussian_process_leaves_noise_alone() -> None:
     assert rms(gaussian_process(given), measured) < 1.03 * rms(given.held_out.predicted, measured)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_p_value_is_uniform_where_the_simulator_is_right() -> None:
     rng = np.random.default_rng(0)
     simulated = rng.standard_normal((300, 8))
@@ -60,7 +60,7 @@ def p_value(given: Calibrated) -> float:
     return misspecification_p(*observed_and_simulated(given, seed=0, draws=30), seed=0, shuffles=200)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_recordings_of_the_simulator_itself_raise_no_alarm_and_others_do() -> None:
     assert p_value(played()) > 0.05
     assert p_value(played([("viscous_drag", ("puck1", "puck2"), [0.1])])) < 0.05

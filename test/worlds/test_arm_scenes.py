@@ -151,7 +151,7 @@ fit, and is given here. With steps of 0.5 ms the two engines agree.
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(("name", "step", "later", "most"), EXCESS)
 def test_the_cell_at_the_true_values_plays_the_same_motion(
     name: str, step: str | None, later: float, most: dict[str, float], tmp_path: Path

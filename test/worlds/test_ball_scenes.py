@@ -27,7 +27,7 @@ SCENES = {
 """Cell -> laws that are asked of it."""
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", SCENES)
 def test_what_is_concealed_can_be_read_and_unsealed(name: str, tmp_path: Path) -> None:
     out, answers = tmp_path / "world", tmp_path / "answers"
