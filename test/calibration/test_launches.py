@@ -7,6 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from compass_ros.calibration.cost import ROBUST, Point
+from compass_ros.calibration.launches import relaunched
+from compass_ros.calibration.least_squares import NONE, minimise
 from compass_ros.calibration.noise import measure_noise
 from compass_ros.calibration.refine import refine
 from compass_ros.cells import Cell
@@ -16,6 +19,7 @@ from compass_ros.posing import Posed
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import recordings
 from compass_ros.types import Episode, Floats, Track
+from test.calibration.toys import likelihood, oscillation
 from test.cells.written import content, parameter, written
 
 START, NOISE = 10**12, 1e-3
@@ -82,3 +86,18 @@ def test_what_the_cell_states_stands(tmp_path: Path) -> None:
 def test_nothing_is_missing_there(tmp_path: Path) -> None:
     of = cell(tmp_path, FAST)
     assert calibrate(recorded(of), of, CalibrationConfig(threads=1))[0].mismatch.verdict == "none"
+
+
+def test_a_launch_in_a_side_minimum_is_found_anew_and_the_others_stay() -> None:
+    """Sines of six seconds with their frequency as the launch: two of four episodes begin beside it."""
+    commanded, launched = np.full((4, 1), 1.0), np.array([[1.02], [0.97], [1.05], [0.99]])
+    given = likelihood(oscillation, (0.0,), commanded, launched=launched, launch_std=0.1, noise=0.01, seconds=6.0)
+    aside = np.array([[0.02], [0.3], [0.05], [-0.25]])
+    fit = minimise(given, Point(np.zeros(1), aside, np.inf), NONE, 20, ROBUST)
+    assert np.abs(fit.point.launch - (launched - 1)).max() > 0.1
+    found = relaunched(given, fit)
+    assert found.launch == pytest.approx(launched - 1, abs=0.003)
+    assert (found.launch[[0, 2]] == fit.point.launch[[0, 2]]).any()
+    assert found.cost < fit.point.cost
+    again = minimise(given, found, NONE, 1, ROBUST).point
+    assert found.cost == pytest.approx(again.cost, abs=1.0)
