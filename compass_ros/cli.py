@@ -18,7 +18,10 @@ from compass_ros.commands import (
     diagnose,
     evaluate,
     export,
+    fleet,
+    history,
     init,
+    layout,
     plan,
     policy,
     prove,
@@ -39,6 +42,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 for module in (demo, init, plan, track, record, check, calibrate, evaluate, diagnose, report, export, policy):
+    module.add_to(app)
+for module in (history, fleet, layout):
     module.add_to(app)
 for module in (conceal, unseal, prove, rivals, bench, real, tables):
     module.add_to(app)

@@ -8,8 +8,8 @@ import os
 import shlex
 import sys
 import time
-from collections.abc import Mapping
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from enum import Enum
 from pathlib import Path
@@ -22,6 +22,7 @@ from compass_ros.types import Progress, Result
 
 if TYPE_CHECKING:
     from compass_ros.discovery import Discovery
+    from compass_ros.reporting.live import LiveReport
 
 
 class ProgressStyle(str, Enum):
@@ -61,11 +62,15 @@ def calibrate(
         float, typer.Option(help="probability of naming something, or `unknown`, where nothing is missing")
     ] = 0.01,
     progress: Annotated[ProgressStyle, typer.Option(help="how to show progress")] = ProgressStyle.bar,
+    serve: Annotated[
+        int | None,
+        typer.Option(min=0, max=65535, help="show progress and report on this port of localhost; 0: any free one"),
+    ] = None,
     repeat: Annotated[str, typer.Option(hidden=True, help="the command that the report gives; empty: this one")] = "",
 ) -> None:
     """Find which simulator parameters are wrong, what they should be, and what physics is missing."""
     given = settings(method, seed, rollouts, held_out, episodes, discover, config, parameters, false_alarm)
-    run(bags, cell, out, given, progress, repeat or shlex.join(["compass", *sys.argv[1:]]))
+    run(bags, cell, out, given, progress, repeat or shlex.join(["compass", *sys.argv[1:]]), serve)
 
 
 def settings(
@@ -102,8 +107,12 @@ def run(
     config: Mapping[str, object],
     style: ProgressStyle,
     repeat: str,
+    serve: int | None = None,
 ) -> None:
-    """Calibrate, write everything into `out`, print the tables; `repeat` is the command line that the report gives."""
+    """Calibrate, write everything into `out`, print the tables.
+
+    `repeat` is the command line that the report gives; `serve` the port on which a browser can watch.
+    """
     from compass_ros.cells import load
     from compass_ros.config import calibration_config
     from compass_ros.operation.current import read_usable
@@ -124,10 +133,12 @@ def run(
         write_all(result, found, cell, out, repeat)
         return result
 
-    with _shown(style) as report:
-        steady = Steady(report)
+    with _shown(style) as report, _live(out, serve) as live:
+        steady = Steady(live.beside(report) if live else report)
         result = write(*pipeline(reading.episodes, cell, validated, steady, write))
         steady.end("written")
+        if live:
+            live.end()
     if style is ProgressStyle.bar:
         print_result(result)
         for warning in (*result.left_out, *result.warnings):
@@ -139,6 +150,18 @@ def _shown(style: ProgressStyle) -> AbstractContextManager[Bar | _JsonLines | _Q
     if style is ProgressStyle.bar:
         return Bar()
     return nullcontext(_JsonLines() if style is ProgressStyle.json else _Quiet())
+
+
+@contextmanager
+def _live(out: Path, port: int | None) -> Iterator[LiveReport | None]:
+    from compass_ros.reporting.live import LiveReport
+
+    if port is None:
+        yield None
+        return
+    with LiveReport(out, port, computing=True) as live:
+        typer.echo(f"watch it at {live.address}", err=True)
+        yield live
 
 
 class _Quiet:

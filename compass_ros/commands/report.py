@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,6 +22,10 @@ def report(
     folder: Annotated[Path, typer.Argument(help="folder of a result")],
     out: Annotated[Path | None, typer.Option(help="file to write; else report.html in the folder")] = None,
     truth: Annotated[Path | None, typer.Option(help="YAML of true values by parameter, to show beside")] = None,
+    serve: Annotated[
+        int | None,
+        typer.Option(min=0, max=65535, help="draw nothing: show the folder on this port of localhost, as it changes"),
+    ] = None,
 ) -> None:
     """Draw report.html again from what a calibration has left."""
     from dataclasses import replace
@@ -29,12 +34,28 @@ def report(
     from compass_ros.reporting.kept import read_all
     from compass_ros.results import REPORT
 
+    if serve is not None:
+        watch(folder, serve)
+        return
     result, extras = read_all(folder)
     if truth is not None:
         extras = replace(extras, truth=read_truth(truth, result))
     path = out or folder / REPORT
     write_report(result, path, extras)
     typer.echo(f"report: {os.path.relpath(path)}")
+
+
+def watch(folder: Path, port: int) -> None:
+    """Serve the folder's report until Ctrl-C. Raises ConfigError: there is no such folder, or the port is taken."""
+    from compass_ros.errors import ConfigError
+    from compass_ros.reporting.live import LiveReport
+
+    if not folder.is_dir():
+        raise ConfigError(f"{folder}: expected the folder of a result, found none")
+    with LiveReport(folder, port, computing=False) as live:
+        typer.echo(f"watch it at {live.address}; Ctrl-C ends it", err=True)
+        with suppress(KeyboardInterrupt):
+            live.wait()
 
 
 def read_truth(path: Path, result: Result) -> Mapping[str, float]:

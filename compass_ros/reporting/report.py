@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+from collections.abc import Mapping
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -37,18 +38,23 @@ def render(result: Result, extras: ReportExtras) -> str:
     Three guards: the template escapes all that it prints; the figures' numbers travel as JSON without a `<`; and the
     page's own security policy lets only the two scripts run whose hashes it names, and loads nothing.
     """
+    return page("report.html.j2", SCRIPTS, figure_data(result, extras), view(result, extras))
+
+
+def page(template: str, scripts: tuple[str, ...], data: Any, shown: Mapping[str, Any]) -> str:
+    """A template of the report's style with what it prints, and the numbers that its scripts draw."""
     environment = Environment(
         loader=PackageLoader("compass_ros.reporting"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
-    plotly, script = _plotly(), _script()
-    return environment.get_template("report.html.j2").render(
-        **view(result, extras),
-        policy=f"{POLICY} script-src {_hash(plotly)} {_hash(script)}",
-        style=Markup(_style()),
+    plotly, script = _plotly(), _script(scripts)
+    return environment.get_template(template).render(
+        **shown,
+        policy=f"{POLICY} script-src {content_hash(plotly)} {content_hash(script)}",
+        style=Markup(style()),
         plotly=Markup(plotly),
         script=Markup(script),
-        data=Markup(embedded_json(figure_data(result, extras))),
+        data=Markup(embedded_json(data)),
     )
 
 
@@ -58,12 +64,12 @@ def embedded_json(data: Any) -> str:
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def _hash(script: str) -> str:
+def content_hash(script: str) -> str:
     """The source expression of a content security policy for an inline script."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
 
 
-def _template(name: str) -> str:
+def template_text(name: str) -> str:
     return resources.files("compass_ros.reporting").joinpath("templates", name).read_text(encoding="utf-8")
 
 
@@ -74,17 +80,17 @@ def _plotly() -> str:
 
 
 @cache
-def _script() -> str:
-    body = "\n".join(_template(name) for name in SCRIPTS)
+def _script(scripts: tuple[str, ...]) -> str:
+    body = "\n".join(template_text(name) for name in scripts)
     return f'(() => {{\n"use strict";\n{body}\n}})();'
 
 
 @cache
-def _style() -> str:
+def style() -> str:
     light, dark = css_variables(LIGHT), css_variables(DARK)
     themes = (
         f":root {{ color-scheme: light; {light} }}\n"
         f"@media (prefers-color-scheme: dark) {{ :root:not([data-theme=light]) {{ color-scheme: dark; {dark} }} }}\n"
         f":root[data-theme=dark] {{ color-scheme: dark; {dark} }}\n"
     )
-    return themes + _template("report.css")
+    return themes + template_text("report.css")
