@@ -13,6 +13,7 @@
 #   make bench   the benchmark of methods (docs/benchmarks.md); goes on where it was stopped
 #   make site    the documentation as a site, in out/site
 #   make wheel   what `pip install` takes, in dist/; make engines: old and new MuJoCo and numpy; make ray: a small cluster
+#   make mjx     laws in MJX (jax) beside our rollouts, in an environment of its own
 #   make lint | readers | bags | lock | clean
 #
 # ARGS are handed on:  make demo ARGS="--shots 20"
@@ -34,7 +35,7 @@ READERS := test/readers
 RERUN   := .venv-rerun
 SITE    := .venv-site
 
-.PHONY: demo prove real league test lint bench bags readers install interfaces lock clean soak nightly fuzz cells mutate ray engines wheel site
+.PHONY: demo prove real league test lint bench bags readers install interfaces lock clean soak nightly fuzz cells mutate ray mjx engines wheel site
 .DELETE_ON_ERROR:
 
 demo: install
@@ -92,6 +93,11 @@ ray:
 	test -x .venv-ray/bin/python || { $(PYTHON) -m venv .venv-ray && .venv-ray/bin/python -m pip install --quiet ".[ray]" pytest; }
 	.venv-ray/bin/python -m pytest -p no:cacheprovider test/executors $(ARGS)
 
+# Laws as functions for MJX beside our own rollouts; jax and mujoco-mjx are no part of the tested environment.
+mjx:
+	test -x .venv-mjx/bin/python || { $(PYTHON) -m venv .venv-mjx && .venv-mjx/bin/python -m pip install --quiet ".[mjx]" pytest; }
+	.venv-mjx/bin/python -m pytest -p no:cacheprovider test/targets/test_mjx.py $(ARGS)
+
 # The same calibrations on the oldest and the newest MuJoCo and numpy (docs/engines.md).
 engines:
 	$(PYTHON) scripts/engines.py --out out/engines $(ARGS)
@@ -140,6 +146,6 @@ lock:
 	$(BIN)/python scripts/lock.py > requirements.lock
 
 clean:
-	rm -rf $(VENV) .venv-ray .venv-build $(RERUN) $(SITE) $(READERS)/node_modules build install log out .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
+	rm -rf $(VENV) .venv-ray .venv-mjx .venv-build $(RERUN) $(SITE) $(READERS)/node_modules build install log out .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
 	rm -f compass_ros/simulation/native/*.so
 	find compass_ros test scripts examples -name __pycache__ -type d -prune -exec rm -rf {} +

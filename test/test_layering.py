@@ -58,6 +58,7 @@ HOMES = {
     ("torch",): {"calibration", "policy"},
     ("numba",): {"worlds"},
     ("ray",): {"executors"},
+    ("jax",): {"targets"},
     ("pysindy", "sklearn"): {"rivals"},
     ("cv2",): {"tracking"},
     ("rosbags", "mcap", "mcap_ros2"): {"episodes"},

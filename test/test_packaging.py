@@ -39,7 +39,7 @@ def plain(name: str) -> str:
 
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-APART = {"ray"}
+APART = {"ray", "mujoco-mjx", "jax"}
 """Extras that are tested in an environment of their own, and so not locked."""
 
 

@@ -12,11 +12,12 @@ from compass_ros.reporting.result_json import read_result
 from compass_ros.simulation.effects import read_effects
 from compass_ros.targets.commands import commands_of
 from compass_ros.targets.control import write_control
+from compass_ros.targets.mjx import write_mjx
 from compass_ros.targets.plain_mjcf import write_plain
 from compass_ros.targets.said import Said
 from compass_ros.targets.urdf import is_urdf, write_urdf
 
-PLAIN, URDF, CONTROL = "plain.xml", "robot.urdf", "pid_controller.yaml"
+PLAIN, URDF, CONTROL, MJX = "plain.xml", "robot.urdf", "pid_controller.yaml", "laws_mjx.py"
 
 
 def export(folder: Path, cell: Cell, urdf: Path | None = None) -> dict[Path, tuple[Said, ...]]:
@@ -30,7 +31,10 @@ def export(folder: Path, cell: Cell, urdf: Path | None = None) -> dict[Path, tup
     if not scene.is_file():
         raise ConfigError(f"{folder}: has no scene.xml; `compass calibrate` writes it beside result.json")
     model, told = mujoco.MjModel.from_xml_path(str(scene)), commands_of(cell, values)
-    written = {folder / PLAIN: write_plain(scene, read_effects(folder / "effects.yaml"), told, folder / PLAIN)}
+    laws = read_effects(folder / "effects.yaml")
+    written = {folder / PLAIN: write_plain(scene, laws, told, folder / PLAIN)}
+    if laws.effects or laws.sliding:
+        written[folder / MJX] = write_mjx(scene, laws, folder / MJX)
     source = urdf or (cell.model_path if is_urdf(cell.model_path) else None)
     if urdf is not None and not is_urdf(urdf):
         raise ConfigError(f"{urdf}: is no URDF; expected an XML document with <robot>")
