@@ -517,7 +517,7 @@ def main() -> None:
     cases = [make() for name, make in made.items() if given.case in (None, name)]
     if small:
         cases = [replace(case, inputs=case.inputs[:2]) for case in cases]
-    sizes, draws = (list[int](), 10) if small else ([16384, 64, 4096], 100)
+    sizes, draws = (list[int](), 10) if small else ([4096, 64, 16384], 100)
     log.say(what="machine", cores=cases[0].simulator.threads, numpy=np.__version__, mujoco=mujoco.__version__)
     kept: dict[str, Kept] = {}
     cpu_step_s: dict[str, float] = {}

@@ -15,7 +15,7 @@ import json
 import os
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -155,17 +155,23 @@ def main() -> None:
     coming = [threads.submit(case.ready, batch) for case, batch, _ in asked]
     for (case, batch, whole), soon in zip(asked, coming, strict=True):
         named = {"label": label, "case": case.name, "batch": batch}
-        try:
-            arguments, function, compile_s = soon.result(timeout=max(until - time.monotonic(), 0))
-        except TimeoutError:
+        if wait([soon], max(until - time.monotonic(), 0)).not_done:
             say(**named, missing="no time left to compile it")
             continue
+        if (failed := soon.exception()) is not None:
+            say(**named, missing=f"{type(failed).__name__}: {failed}"[:400])
+            continue
+        arguments, function, compile_s = soon.result()
         with (Path(folder) / "lock").open("w", encoding="utf-8") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             if time.monotonic() > until:
                 say(**named, compile_s=compile_s, missing="no time left to run it")
                 continue
-            seen, per_step = play(case, function, arguments, until, WINDOW_S if whole else TIMED_S)
+            try:
+                seen, per_step = play(case, function, arguments, until, WINDOW_S if whole else TIMED_S)
+            except jax.errors.JaxRuntimeError as error:
+                say(**named, compile_s=compile_s, missing=str(error)[:400])
+                continue
         if whole:
             np.savez(Path(folder) / f"{label}-{case.name}.npz", seen=seen[:, : case.rollouts].transpose(1, 0, 2))
         say(**named, compared=whole, compile_s=round(compile_s, 2), step_ms=1e3 * per_step, frames=len(seen),
