@@ -54,7 +54,7 @@ class Spread:
         unit = unit_text(self.mean.unit)
         return [
             f"{label} differs in {self.name}: {value_of(self.units[label])} {unit}".rstrip()
-            + f", the others {plain(self.mean.value)} with a spread of {plain(self.tau, 2)} {unit}".rstrip()
+            + f", the others {plain(self.mean.value, 3)} with a spread of {plain(self.tau, 2)} {unit}".rstrip()
             + f" (by chance: {probability(p)})"
             for label, p in self.odd.items()
         ]

@@ -75,8 +75,8 @@ class Page:
             self._loaded = True
         return message
 
-    def show(self, path: Path, width: int, height: int = 900, dark: bool = False) -> None:
-        """Open a file at a window size (phones below 600 px touch, and have no hover) and theme; wait until loaded."""
+    def show(self, path: Path | str, width: int, height: int = 900, dark: bool = False) -> None:
+        """Open a file or an address at a window size (below 600 px: a phone, without hover) and theme; wait for it."""
         phone = width < 600
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=phone)
         self.call("Emulation.setTouchEmulationEnabled", enabled=phone)
@@ -85,7 +85,7 @@ class Page:
         self.console.clear()
         self.requests.clear()
         self._loaded = False
-        self.call("Page.navigate", url=path.as_uri())
+        self.call("Page.navigate", url=path if isinstance(path, str) else path.as_uri())
         until = time.monotonic() + TIMEOUT_S
         while not self._loaded:
             self._receive(until)
