@@ -130,7 +130,7 @@ def test_priors_are_a_cell_that_the_suite_reads(tmp_path: Path, run: Command) ->
 def test_from_recordings_to_the_priors_of_the_next_unit(tmp_path: Path, run: Command) -> None:
     """Three calibrations of one pendulum are three units that do not differ; the fourth begins where they ended."""
     cell, bags = PENDULUM / "pendulum.yaml", PENDULUM / "bags"
-    for name, swings in (("a", (1, 2)), ("b", (3, 4)), ("c", (5, 2))):
+    for name, swings in (("a", (1,)), ("b", (3,)), ("c", (5,))):
         words = ("--no-discover", "--held-out", "0", "--progress", "none")
         folders = [bags / f"swing_{i}" for i in swings]
         assert run("calibrate", "--cell", cell, "--out", tmp_path / "units" / name, *words, *folders)[0] == 0
