@@ -22,6 +22,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -167,15 +168,15 @@ def write(case: Case, values: Floats, folder: Path) -> list[str]:
     physics, model = case.simulator.physics, case.simulator.physics.model
     spec_path = case.simulator.cell.model_path
     (folder / f"{case.name}.xml").write_text(Path(spec_path).read_text(encoding="utf-8"), encoding="utf-8")
-    names = [n for n in dir(model) if n[0] != "_" and _is_real(model, n)]
+    names = [n for n in dir(model) if n[0] != "_" and _is_real(model, n)] + ["opt.gravity"]
     arrays: dict[str, list[Floats]] = {name: [] for name in names}
     for row in values:
         written = case.simulator.written(row)
         for name in names:
-            arrays[name].append(np.array(getattr(written, name)))
+            arrays[name].append(np.array(attrgetter(name)(written)))
     compiled = mujoco.MjModel.from_xml_path(str(folder / f"{case.name}.xml"))
     own = {name: np.stack(rows) for name, rows in arrays.items()}
-    differing = {name: rows for name, rows in own.items() if (rows != getattr(compiled, name)).any()}
+    differing = {name: rows for name, rows in own.items() if (rows != attrgetter(name)(compiled)).any()}
     terms = physics.terms(values)
     wide = max(term.numbers.shape[1] for term in terms)
     numbers = np.zeros((len(values), len(terms), wide))

@@ -48,6 +48,13 @@ def loaded(path: Path) -> ModuleType:
     return module
 
 
+def _of(model: Any, name: str) -> Any:
+    """What a model has by that name, as `opt.gravity`; None where it has none."""
+    for part in name.split("."):
+        model = getattr(model, part, None)
+    return model
+
+
 class Case:
     """A scene with rollouts that were prepared: numbers of the model, of the laws, starts and controls of each."""
 
@@ -62,7 +69,7 @@ class Case:
             setattr(scene.opt, option, most)
         self.model = mjx.put_model(scene)
         named = {key.removeprefix("field_"): key for key in self.given if key.startswith("field_")}
-        known = {name for name in named if isinstance(getattr(self.model, name, None), jax.Array)}
+        known = {name for name in named if isinstance(_of(self.model, name), jax.Array)}
         self.unknown = sorted(set(named) - known)
         self.fields = {name: named[name] for name in sorted(known)}
         self.axes = jax.tree_util.tree_map(lambda _: None, self.model).tree_replace(dict.fromkeys(self.fields, 0))
