@@ -95,7 +95,7 @@ ray:
 
 # Laws as functions for MJX beside our own rollouts; jax and mujoco-mjx are no part of the tested environment.
 mjx:
-	test -x .venv-mjx/bin/python || { $(PYTHON) -m venv .venv-mjx && .venv-mjx/bin/python -m pip install --quiet ".[mjx]" pytest; }
+	test -x .venv-mjx/bin/python || { $(PYTHON) -m venv .venv-mjx && .venv-mjx/bin/python -m pip install --quiet ".[mjx]" mujoco==3.9.0 mujoco-mjx==3.9.0 pytest; }
 	.venv-mjx/bin/python -m pytest -p no:cacheprovider test/targets/test_mjx.py $(ARGS)
 
 # The same calibrations on the oldest and the newest MuJoCo and numpy (docs/engines.md).
