@@ -117,16 +117,24 @@ def test_a_folder_that_is_not_there_is_one_line(tmp_path: Path, run: Run) -> Non
 
 
 def test_a_watched_folder_is_served_until_the_process_is_interrupted(tmp_path: Path, result: Result) -> None:
-    command = [sys.executable, "-m", "compass_ros.cli", "report", str(tmp_path), "--serve", "0"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stderr is not None
-        port = int(process.stderr.readline().split("localhost:")[1].split("/")[0])
-        assert json.loads(ask(port, "/state.json")[1])["report"] is None
-        write(tmp_path, result)
-        assert json.loads(ask(port, "/state.json")[1])["report"] is not None
-        process.send_signal(signal.SIGINT)
-        assert process.wait(20) == 0
-        assert process.stderr.read() == ""
+    words = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"  # shells take it from background jobs
+    )
+    command = [sys.executable, "-c", f"{words}; from compass_ros.cli import main; main()"]
+    with subprocess.Popen(
+        [*command, "report", str(tmp_path), "--serve", "0"], stderr=subprocess.PIPE, text=True
+    ) as one:
+        try:
+            assert one.stderr is not None
+            port = int(one.stderr.readline().split("localhost:")[1].split("/")[0])
+            assert json.loads(ask(port, "/state.json")[1])["report"] is None
+            write(tmp_path, result)
+            assert json.loads(ask(port, "/state.json")[1])["report"] is not None
+            one.send_signal(signal.SIGINT)
+            assert one.wait(20) == 0
+            assert one.stderr.read() == ""
+        finally:
+            one.kill()
 
 
 @pytest.mark.slow
