@@ -31,6 +31,7 @@ import numpy as np
 from mujoco.rollout import Rollout
 
 from compass_ros.bench.driven import Routine, drawn_truth, record
+from compass_ros.calibration.differences import FIRST_STEP, Linear, difference_steps
 from compass_ros.cells import load
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
@@ -45,9 +46,8 @@ HERE = Path(__file__).parent
 ALPHA = 0.01
 """False-alarm rate of a verdict: a law is named at posterior odds of (1 - ALPHA) / ALPHA."""
 NAMED = float(np.log((1 - ALPHA) / ALPHA))
-FIRST_STEP = 0.02
-"""Of first differences, in standard deviations of the prior, as in calibration/differences.py; then steps that move the
-residual by about one sigma, as there."""
+NONE = np.empty(0)
+"""What the steps of differences do not ask for."""
 DISPLACED = 0.3
 """How far off the second point of the parameters is, in standard deviations of the prior."""
 STRENGTHS = (0.0, 0.7, 1.0, 1.3, 2.0)
@@ -252,8 +252,7 @@ def rows_of(case: Case) -> Rows:
         seen = by_mujoco(case, np.concatenate([np.tile(case.truth, (2, 1)), some.values]))
         jacobian = some.jacobian(seen, case.sigma)
         shaped = jacobian.reshape(len(case.inputs), -1, len(steps))
-        typical = np.quantile(np.sqrt(np.mean(shaped**2, axis=1)), 0.75, axis=0)
-        steps = np.clip(1 / np.maximum(typical, 1e-12), 1e-3, 1.0)
+        steps = difference_steps(Linear(NONE, shaped[:, :, None], NONE, NONE))
     strengths = np.array(STRENGTHS) * just_named(jacobian)
     planted = np.tile(case.truth, (len(strengths), 1))
     planted[:, case.free[-1]] += strengths * case.prior_std[-1]

@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from compass_ros.operation.fleet import ODD, Next
-from compass_ros.operation.several import Number
+from compass_ros.operation.fleet import Next
+from compass_ros.operation.several import BY_CHANCE, Number
 
 DRAWS = 3000
 SPREADS, OUT = (0.0, 1.0, 30.0), (5.0, 10.0, 20.0)
@@ -23,7 +23,7 @@ def named(units: int, tau: float, out: float, rng: np.random.Generator) -> float
         values = rng.normal(0.0, tau, units) + rng.normal(0.0, 1.0, units)
         values[0] += out * math.hypot(tau, 1.0)
         said = [Number(float(value), 1.0, "") for value in values]
-        count += Next(said[1:]).chance(said[0]) < ODD
+        count += Next(said[1:]).chance(said[0]) < BY_CHANCE
     return count / DRAWS
 
 

@@ -56,16 +56,18 @@ def robust_weight(residual: Floats, robust: float) -> Floats:
     return np.asarray(1 / np.sqrt(1 + (residual / robust) ** 2))
 
 
+def launches_away(likelihood: Likelihood, point: Point) -> Floats:
+    """(E, a) launches that are not exact, in standard deviations of their prior."""
+    random = likelihood.launch_std > 0
+    return np.asarray(point.launch[:, random] / likelihood.launch_std[random])
+
+
 def cost_by_episode(likelihood: Likelihood, point: Point, residual: Floats, robust: float) -> Floats:
     """(E,) what each episode adds to the cost: its (F, C) residuals and its launch."""
-    random = likelihood.launch_std > 0
-    launch = point.launch[:, random] / likelihood.launch_std[random]
     of_frames = robust_loss(residual, robust).reshape(len(residual), -1).sum(axis=1)
-    return np.asarray(0.5 * (of_frames + np.sum(launch**2, axis=1)))
+    return np.asarray(0.5 * (of_frames + np.sum(launches_away(likelihood, point) ** 2, axis=1)))
 
 
 def _prior(likelihood: Likelihood, point: Point) -> float:
     scaled = (point.values - likelihood.prior_mean) / likelihood.prior_std
-    random = likelihood.launch_std > 0
-    launch = point.launch[:, random] / likelihood.launch_std[random]
-    return 0.5 * float(np.sum(scaled**2) + np.sum(launch**2))
+    return 0.5 * float(np.sum(scaled**2) + np.sum(launches_away(likelihood, point) ** 2))

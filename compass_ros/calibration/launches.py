@@ -9,14 +9,15 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import chi2
 
-from compass_ros.calibration.cost import ROBUST, Point, cost, cost_by_episode, start
+from compass_ros.calibration.cost import ROBUST, Point, cost, cost_by_episode, launches_away, start
 from compass_ros.calibration.least_squares import NONE, Fit, minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.residuals import covariance, typical_residual
 from compass_ros.types import Floats
 
 CHANCE = 1e-3
-"""Probability with which readings that are as wrong as was expected are taken for worse ones."""
+"""Probability with which readings that are as wrong as was expected are taken for worse ones: of a hundred calibrations
+hardly one is done twice for nothing, as in `cells/start.py`."""
 STEPS, OF_WINDOWS = 12, 2
 """Gauss-Newton steps for the launches, and for the first states of windows: within their noise the motion is linear in
 these."""
@@ -78,8 +79,7 @@ def unexpected(likelihood: Likelihood, fit: Fit) -> Floats:
 
 def _launches(likelihood: Likelihood, fit: Fit) -> tuple[Floats, Floats]:
     """(E, a) launches that are not exact and (E, a) variances of their errors, in the prior's standard deviations."""
-    random = likelihood.launch_std > 0
-    away = fit.point.launch[:, random] / likelihood.launch_std[random]
+    away = launches_away(likelihood, fit.point)
     return away, np.diag(covariance(likelihood, fit))[len(fit.free) :].reshape(away.shape)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compass_ros.calibration.cost import Point, cost, robust_weight
+from compass_ros.calibration.cost import Point, cost, launches_away, robust_weight
 from compass_ros.calibration.differences import FIRST_STEP, Linear, broyden, difference_steps, linearise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.types import Bools, Floats, Ints
@@ -73,9 +73,8 @@ def normal_equations(
         hessian[own, own] += (jl[e] * w[e][:, None]).T @ jl[e]
         gradient[:p] += weighted.T @ r[e]
         gradient[own] += (jl[e] * w[e][:, None]).T @ r[e]
-    random = likelihood.launch_std > 0
     gradient[:p] += (point.values[free] - likelihood.prior_mean[free]) / likelihood.prior_std[free]
-    gradient[p:] += (point.launch[:, random] / likelihood.launch_std[random]).ravel()
+    gradient[p:] += launches_away(likelihood, point).ravel()
     return hessian, gradient
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -44,11 +45,12 @@ def windows(
     driven = bool(cell.action or cell.spec.inputs)
     late: dict[str, tuple[int, ...]] = {}
     out, still, longest = {}, [], 0.0
+    scene = cache(lambda: Simulator(cell, threads=1))
     looked = [(name, one) for name, signal in signals.items() for one in signal.parts if not one.part.turns]
     for name, episode in episodes.items():
         own = [(signal, part, one) for signal, part in looked for one in part.series if one.recording == name]
         stays = driven or episode.initial_state or name in wrong
-        moved = episode if stays else _started(cell, episode, own)
+        moved = episode if stays else _started(cell, scene, episode, own)
         if moved.start_ns != episode.start_ns:
             late[name] = ()
             longest = max(longest, (moved.start_ns - episode.start_ns) * _NS)
@@ -68,7 +70,7 @@ Seen = Sequence[tuple[str, Looked, Series]]
 """What is seen in one recording: the signal, the part of it, its samples."""
 
 
-def _started(cell: Cell, episode: Episode, seen: Seen) -> Episode:
+def _started(cell: Cell, scene: Callable[[], Simulator], episode: Episode, seen: Seen) -> Episode:
     """The episode with time 0 where something begins to move; where the cell knows of a release, so much earlier.
 
     What is tracked may stand still at first although the scene moves: a thing that falls towards it, say. Time 0 is as
@@ -79,8 +81,10 @@ def _started(cell: Cell, episode: Episode, seen: Seen) -> Episode:
         return episode
     release = cell.spec.release
     if release is None:
-        moved = replace(episode, start_ns=max(moment, episode.start_ns))
-        lead = round(_lead(cell, moved, seen) / _NS)
+        if moment <= episode.start_ns:
+            return episode
+        moved = replace(episode, start_ns=moment)
+        lead = round(_lead(scene(), moved, seen) / _NS)
         if not lead:
             return moved
         own = moment - episode.start_ns < _OWN * lead
@@ -90,13 +94,13 @@ def _started(cell: Cell, episode: Episode, seen: Seen) -> Episode:
     return episode if usual else replace(episode, start_ns=max(moment - lead, episode.start_ns))
 
 
-def _lead(cell: Cell, episode: Episode, seen: Seen) -> float:
+def _lead(simulator: Simulator, episode: Episode, seen: Seen) -> float:
     """How long nothing that is tracked moves in the simulator at its defaults, from the state of an episode [s]."""
+    cell = simulator.cell
     try:
         inputs = cell.inputs(episode)
     except DataError:  # too little is left of it; said where it is read
         return 0.0
-    simulator = Simulator(cell, threads=1)
     period = min(one.period_s for _, _, one in seen)
     time = np.arange(0.0, cell.duration, period if period > 0 else cell.control_dt)
     motion = simulator.observe(simulator.defaults[None], simulator.inputs(inputs[None]), time[None])[0]

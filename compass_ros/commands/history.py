@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -20,20 +18,12 @@ def history(
     as_json: Annotated[bool, typer.Option("--json", help="print JSON instead of tables")] = False,
 ) -> None:
     """Show how parameters, gaps and explanations of one cell move from week to week, and what moved when."""
+    from compass_ros.commands.sheet_output import show
     from compass_ros.operation.history import history as compare
     from compass_ros.operation.history import to_json
     from compass_ros.operation.several import read_runs
     from compass_ros.operation.sheets import history_sheet
-    from compass_ros.reporting.sheet import print_sheet, write_sheet
 
     runs, left_out = read_runs(folders)
     found = compare(runs)
-    sheet = history_sheet(found, left_out)
-    if out is not None:
-        write_sheet(sheet, out)
-    if as_json:
-        typer.echo(json.dumps(to_json(found) | {"left_out": left_out}, indent=1))
-        return
-    print_sheet(sheet)
-    if out is not None:
-        typer.echo(f"page: {os.path.relpath(out)}")
+    show(history_sheet(found, left_out), to_json(found), left_out, out, as_json)

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from compass_ros.calibration.cost import launches_away
 from compass_ros.calibration.least_squares import Fit, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.evidence import Tangent
@@ -60,7 +61,7 @@ class Response:
     @cached_property
     def tangent(self) -> Tangent:
         likelihood, fit = self.likelihood, self.fit
-        episodes, random = len(likelihood.inputs), likelihood.launch_std > 0
+        episodes = len(likelihood.inputs)
         linear, point = fit.linear, fit.point
         rows = (episodes, linear.residual[0].size)
         return Tangent(
@@ -69,7 +70,7 @@ class Response:
             own=linear.launch_jacobian.reshape(*rows, -1),
             pushes=self.pushes.reshape(*rows, -1),
             away=((likelihood.prior_mean - point.values) / likelihood.prior_std)[fit.free[self.inside]],
-            own_away=-point.launch[:, random] / likelihood.launch_std[random],
+            own_away=-launches_away(likelihood, point),
             robust=fit.robust,
             correlation_time=likelihood.correlation_time,
         )

@@ -16,18 +16,17 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.special import ndtr
 
 from compass_ros.operation.history import value_of
-from compass_ros.operation.several import LIKELY, Number, Run, laws, table_of
+from compass_ros.operation.several import BY_CHANCE, LIKELY, Number, Run, laws, mean, table_of
 from compass_ros.reporting.numbers import plain, probability, unit_text
-from compass_ros.types import WRONG, Floats
+from compass_ros.types import Floats
 
 SCHEMA_ID = "compass/fleet/1"
 FEWEST = 3
 """Units from which there is a spread of the others."""
-ODD = float(2 * ndtr(-WRONG))
-"""Probability below which a unit lies outside the others' spread: that of three error bars of a normal distribution."""
 ONE = float(ndtr(1.0))
 _LOG_TAU = np.linspace(-7.0, 14.0, 600)
 """ln(tau / s0) at which tau is integrated out: from a thousandth of an error bar to a million of them."""
@@ -117,7 +116,7 @@ def spread(name: str, units: Mapping[str, Number]) -> Spread:
     odd = {}
     for label, one in units.items():
         p = Next([other for its, other in units.items() if its != label]).chance(one)
-        if p < ODD:
+        if p < BY_CHANCE:
             odd[label] = p
     inside = {label: one for label, one in units.items() if label not in odd}
     mean, tau = dersimonian_laird([*inside.values()])
@@ -132,8 +131,7 @@ def dersimonian_laird(said: Sequence[Number]) -> tuple[Number, float]:
     q = float(w @ (y - w @ y / w.sum()) ** 2)
     scale = float(w.sum() - (w**2).sum() / w.sum())
     tau2 = max(0.0, (q - (len(y) - 1)) / scale) if scale > 0 else 0.0
-    w = 1 / (s**2 + tau2)
-    return Number(float(w @ y / w.sum()), float(w.sum() ** -0.5), said[0].unit), math.sqrt(tau2)
+    return mean(said, tau2), math.sqrt(tau2)
 
 
 def _shrunk(one: Number, mean: Number, tau: float) -> Number:
@@ -166,18 +164,18 @@ class Next:
 
     @property
     def number(self) -> Number:
-        """Median and half of the central 68 %, by bisection."""
+        """Median and half of the central 68 %."""
         low, middle, high = (self._quantile(p) for p in (1 - ONE, 0.5, ONE))
         return Number(middle, (high - low) / 2, self._unit)
 
     def _quantile(self, p: float) -> float:
-        low, high = (float((self._mean + sign * 9 * self._std).min()) if sign < 0 else
-                     float((self._mean + sign * 9 * self._std).max()) for sign in (-1, 1))  # fmt: skip
-        for _ in range(60):
-            middle = (low + high) / 2
-            below = float(self._share @ ndtr((middle - self._mean) / self._std)) < p
-            low, high = (middle, high) if below else (low, middle)
-        return (low + high) / 2
+        far = 9 * self._std
+        low, high = float((self._mean - far).min()), float((self._mean + far).max())
+
+        def beyond(x: float) -> float:
+            return float(self._share @ ndtr((x - self._mean) / self._std)) - p
+
+        return float(brentq(beyond, low, high, xtol=1e-300))
 
 
 def _arrays(said: Sequence[Number]) -> tuple[Floats, Floats]:

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from compass_ros.operation.several import Number, Run, explanations, signals, table_of
+from compass_ros.operation.several import Number, Run, explanations, mean, signals, table_of
 from compass_ros.reporting.numbers import plain, unit_text, with_error
 from compass_ros.types import WRONG
 
@@ -94,14 +94,6 @@ def moves_of(name: str, series: dict[str, Number], order: dict[str, int]) -> tup
     long = [one for one in stretches if len(one) >= FEWEST]
     drifts = [d for one in long if (d := _drift(name, one, [series[label] for label in one], order)) is not None]
     return [*steps, *drifts], count + len(long)
-
-
-def mean(said: Sequence[Number]) -> Number:
-    """Weighted by error bars."""
-    weights = np.array([one.std**-2 for one in said])
-    return Number(
-        float(weights @ [one.value for one in said] / weights.sum()), float(weights.sum() ** -0.5), said[0].unit
-    )
 
 
 def _drift(name: str, labels: Sequence[str], said: Sequence[Number], order: dict[str, int]) -> Move | None:

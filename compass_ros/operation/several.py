@@ -8,6 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from scipy.special import ndtr
+
 from compass_ros.config import read_yaml
 from compass_ros.errors import ConfigError
 from compass_ros.operation.versions import NOT_TO_BE_APPLIED
@@ -16,10 +19,12 @@ from compass_ros.reporting.kept import RESULT
 from compass_ros.reporting.result_json import read_result
 from compass_ros.reporting.view.explanations import ranked
 from compass_ros.reporting.words import best_model
-from compass_ros.types import Explanation, Result, SignalGap
+from compass_ros.types import WRONG, Explanation, Result, SignalGap
 
 LIKELY = 0.5
 """Probability from which a law counts as there."""
+BY_CHANCE = float(2 * ndtr(-WRONG))
+"""Probability that a normal number lies beyond three error bars."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +44,14 @@ class Number:
     value: float
     std: float
     unit: str
+
+
+def mean(said: Sequence[Number], variance: float = 0.0) -> Number:
+    """Weighted by error bars, to which this variance is added."""
+    weights = np.array([1 / (one.std**2 + variance) for one in said])
+    return Number(
+        float(weights @ [one.value for one in said] / weights.sum()), float(weights.sum() ** -0.5), said[0].unit
+    )
 
 
 def read_runs(folders: Sequence[Path]) -> tuple[tuple[Run, ...], tuple[str, ...]]:

@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from compass_ros.operation.fleet import ODD, Fleet, Spread
+from compass_ros.operation.fleet import Fleet, Spread
 from compass_ros.operation.history import History, leading
-from compass_ros.operation.several import Number, Run, explanations, signals
+from compass_ros.operation.several import BY_CHANCE, Number, Run, explanations, signals
 from compass_ros.reporting.numbers import MISSING, plain, probability, unit_text, value_pm
 from compass_ros.reporting.sheet import Figure, Line, Part, Series, Sheet, Table
 from compass_ros.reporting.words import VERDICT_TITLE
 
 SHOWN = 0.01
 """Probability that an explanation needs in some run to get a line."""
-BY_CHANCE = 0.0027
-"""Share of differences beyond three error bars where nothing has changed."""
 
 
 def history_sheet(found: History, left_out: Sequence[str]) -> Sheet:
@@ -54,7 +52,7 @@ def fleet_sheet(found: Fleet, left_out: Sequence[str]) -> Sheet:
     units, lines = found.units, [Line("care", sentence) for sentence in found.sentences]
     ordered = sorted(found.spreads, key=lambda one: min(one.odd.values(), default=1.0))
     shared = [Line("good", f"all units: {name}") for name in found.shared_laws]
-    chance = found.comparisons * ODD
+    chance = found.comparisons * BY_CHANCE
     said = f"{found.comparisons} values were compared; where no unit differs about {plain(chance, 2)} show by chance"
     few = f"told by less than three units, and not compared: {', '.join(found.alone)}"
     notes = [said, *([few] if found.alone else []), *left_out]

@@ -15,7 +15,8 @@ import numpy as np
 
 from compass_ros.cells.rotors import rotors
 from compass_ros.simulation.effects import Exported, FittedEffect
-from compass_ros.simulation.effects.effect import RESTORED, Context, table_friction
+from compass_ros.simulation.effects.attach import context_in
+from compass_ros.simulation.effects.effect import RESTORED, table_friction
 from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.simulation.sites import JOINTS, PLANAR, Places
 from compass_ros.targets.said import Said
@@ -65,8 +66,7 @@ def _of(fitted: FittedEffect, places: Places, exported: Exported, changed: mujoc
         return [], Said(law.name, on, "left out", f"{what}, outside of the model")
     if law.rotor or (rotors(changed) and law.model is not None):
         return [], Said(law.name, on, "left out", "a motor's joint of its own, not tried in MJX")
-    sites = fitted.attached.sites(places)
-    context = Context(sites, exported.sliding, (), (), float(changed.opt.timestep))
+    context = context_in(places, exported, fitted)
     if law.model is not None:
         law.model(changed, np.array(fitted.values), context)
         return [], Said(law.name, on, "exact", "by `prepare`")

@@ -12,7 +12,7 @@ import numpy as np
 
 from compass_ros.cells.rotors import PREFIX
 from compass_ros.simulation.effects import Exported, FittedEffect
-from compass_ros.simulation.effects.effect import Context
+from compass_ros.simulation.effects.attach import context_in
 from compass_ros.simulation.sites import Places
 from compass_ros.targets.said import Said
 
@@ -62,6 +62,17 @@ def _no_joint(fitted: FittedEffect) -> Said:
     return Said(fitted.attached.effect.name, fitted.attached.objects, "left out", what)
 
 
+def _first(element: mujoco.MjsJoint | mujoco.MjsTendon, what: str) -> float:
+    """Stiffness or damping: the first number of a polynomial, or the only one in an older MuJoCo."""
+    return float(np.ravel(getattr(element, what))[0])
+
+
+def _set_first(element: mujoco.MjsJoint | mujoco.MjsTendon, what: str, value: float) -> None:
+    given = np.array(getattr(element, what), dtype=float)
+    given.flat[0] = value
+    setattr(element, what, given if given.ndim else float(given))
+
+
 def _friction(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
     joints = _joints(spec, fitted)
     if not joints:
@@ -76,9 +87,7 @@ def _viscous(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
     if not joints:
         return _no_joint(fitted)
     for joint in joints:
-        damping = np.array(joint.damping, dtype=float)
-        damping[0] += numbers(fitted)["rate"]
-        joint.damping = damping
+        _set_first(joint, "damping", _first(joint, "damping") + numbers(fitted)["rate"])
     return Said("viscous_drag", fitted.attached.objects, "alike", "damping is integrated implicitly")
 
 
@@ -87,14 +96,12 @@ def _spring(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
     if not joints:
         return _no_joint(fitted)
     for joint in joints:
-        stiffness = np.array(joint.stiffness, dtype=float)
-        own, added = float(stiffness.flat[0]), given["stiffness"]
+        own, added = _first(joint, "stiffness"), given["stiffness"]
         if own + added > 0:
             turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE and spec.compiler.degree
             rest = math.degrees(given["rest"]) if turns else given["rest"]
             joint.springref = (own * joint.springref + added * rest) / (own + added)
-        stiffness.flat[0] = own + added
-        joint.stiffness = stiffness if stiffness.ndim else float(stiffness)
+        _set_first(joint, "stiffness", own + added)
     soft = given.get("softening", 0.0)
     if soft:
         return Said("spring", fitted.attached.objects, "alike", f"linear: near its rest; its softening is {soft:.3g}")
@@ -199,7 +206,7 @@ def _between(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
         return Said(fitted.attached.effect.name, on, "left out", "the scene has no motor's side of the joint")
     places, drives = Places(model, frozenset()), model.actuator_trnid[:, 0].copy()
     efforts = model.sensor_objid.copy()
-    context = Context(fitted.attached.sites(places), {}, (), (), float(model.opt.timestep))
+    context = context_in(places, Exported((fitted,), {}), fitted)
     if (law := fitted.attached.effect.model) is not None:
         law(model, np.array(fitted.values), context)
     for name in on:
@@ -207,10 +214,8 @@ def _between(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
         t = model.tendon(tendon.name).id
         tendon.springlength, tendon.range = model.tendon_lengthspring[t], model.tendon_range[t]
         tendon.limited, tendon.solref_limit = int(model.tendon_limited[t]), model.tendon_solref_lim[t]
-        for what, value in (("stiffness", model.tendon_stiffness[t]), ("damping", model.tendon_damping[t])):
-            given = np.array(getattr(tendon, what), dtype=float)
-            given.flat[0] = value
-            setattr(tendon, what, given if given.ndim else float(given))
+        _set_first(tendon, "stiffness", float(model.tendon_stiffness[t]))
+        _set_first(tendon, "damping", float(model.tendon_damping[t]))
         for side in (name, f"{PREFIX}{name}"):
             spec.joint(side).armature = float(model.dof_armature[model.joint(side).dofadr[0]])
     for a in np.flatnonzero(model.actuator_trnid[:, 0] != drives):

@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from compass_ros.cells import load
-from compass_ros.operation.fleet import ODD, Next, dersimonian_laird, fleet, spread
-from compass_ros.operation.several import Number, read_runs
+from compass_ros.operation.fleet import Next, dersimonian_laird, fleet, spread
+from compass_ros.operation.several import BY_CHANCE, Number, read_runs
 from test.conftest import Run as Command
 from test.operation.many_results import result, units, write
 
@@ -53,7 +53,7 @@ def test_units_that_are_alike_are_seldom_called_odd(tau: float, most: float) -> 
     rng, found = np.random.default_rng(4), 0
     for _ in range(800):
         measured = said((rng.normal(0, tau, 6) + rng.normal(0, 1, 6)).tolist(), [1.0] * 6)
-        found += Next(measured[1:]).chance(measured[0]) < ODD
+        found += Next(measured[1:]).chance(measured[0]) < BY_CHANCE
     assert found / 800 <= most
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compass_ros.operation.history import history, mean
-from compass_ros.operation.several import Number, Run, read_runs
+from compass_ros.operation.history import history
+from compass_ros.operation.several import Number, Run, mean, read_runs
 from compass_ros.operation.sheets import history_sheet
 from compass_ros.reporting.sheet import write_sheet
 from test.conftest import Run as Command

@@ -73,8 +73,12 @@ def _context(places: Places, exported: Exported, fitted: FittedEffect) -> Contex
     kind = fitted.attached.effect
     if kind.model is None and kind.forces is None:
         raise ConfigError(f"effect '{kind.name}' belongs to the {kind.channel}, outside the model; apply it there")
-    sites = fitted.attached.sites(places)
-    return Context(sites, exported.sliding, (), (), float(places.model.opt.timestep))
+    return context_in(places, exported, fitted)
+
+
+def context_in(places: Places, exported: Exported, fitted: FittedEffect) -> Context:
+    """What hooks that act on a model are told; there are no sensors. Raises ConfigError where it lacks an object."""
+    return Context(fitted.attached.sites(places), exported.sliding, (), (), float(places.model.opt.timestep))
 
 
 def _end(model: mujoco.MjModel, before: mujoco.MjModel, programs: Programs) -> None:
