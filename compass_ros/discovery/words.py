@@ -97,7 +97,7 @@ def wrong_number(attached: Attached, deviation: float, places: Places) -> str:
 def value_of(finding: EffectFinding, attached: Attached, told: bool) -> str:
     """The effect and its amplitudes: 'fan_field, strength 0.21 +- 0.01 m/s^2'; `told`: with what it acts on.
 
-    A law that is clearly there and has wide error bars is known by its ratio to numbers of the scene.
+    A law that is clearly there and has wide error bars is known together with its shape, or with numbers of the scene.
     """
     numbers, wide = [], True
     for quantity in attached.effect.quantities:
@@ -106,9 +106,9 @@ def value_of(finding: EffectFinding, attached: Attached, told: bool) -> str:
             wide = wide and abs(found.value) < ERROR_BARS * found.std
             unit = "" if found.unit == "1" else f" {found.unit}"
             numbers.append(f"{quantity.name} {found.value:.3g} +- {found.std:.1g}{unit}")
-    ratio = " (only its ratio to numbers of the scene shows)" if wide else ""
+    together = " (shows only together with other numbers)" if wide else ""
     on = f" of {', '.join(attached.objects)}" if told else ""
-    return f"{finding.name}{on}, {', '.join(numbers)}{ratio}"
+    return f"{finding.name}{on}, {', '.join(numbers)}{together}"
 
 
 def errors(before: float, after: float, floor: float, unit: Unit) -> str:
