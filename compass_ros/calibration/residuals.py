@@ -63,21 +63,22 @@ def jackknife(likelihood: Likelihood, fit: Fit) -> Floats:
 
     `covariance` believes that the formula is true and only the measurements are not. Where the formula is another than
     nature's, each episode pulls its quantities elsewhere, and a fit without that episode shows it: the jackknife that
-    leaves out one group at a time (Tukey 1958), with whole episodes as groups. To first order, for no rollouts.
+    leaves out one group at a time (Tukey 1958), with whole episodes as groups. To first order, for no rollouts. Beside
+    the prior, which is information too: along a direction of which the episodes say next to nothing it is the prior's.
     """
     episodes, p = len(likelihood.inputs), len(fit.free)
     parts = [_part_of(likelihood, fit, e) for e in range(episodes)]
     hessian = np.eye(p) + np.sum([part for part, _ in parts], axis=0)
     without = np.array([np.linalg.solve(hessian - part, pull) for part, pull in parts])
     away = without - without.mean(axis=0)
-    return np.asarray((episodes - 1) / episodes * away.T @ away)
+    found = (episodes - 1) / episodes * away.T @ away
+    return np.asarray(found @ np.linalg.inv(np.eye(p) + found))
 
 
 def variances(likelihood: Likelihood, fit: Fit) -> Floats:
     """(p,) of the free parameters, in the prior's: what the noise leaves, or what the episodes disagree on if more."""
     of_noise = np.diag(covariance(likelihood, fit))[: len(fit.free)]
-    of_episodes = np.minimum(np.diag(jackknife(likelihood, fit)), 1.0)  # the prior's at most
-    return np.maximum(of_noise, of_episodes)
+    return np.maximum(of_noise, np.diag(jackknife(likelihood, fit)))
 
 
 def _part_of(likelihood: Likelihood, fit: Fit, episode: int) -> tuple[Floats, Floats]:

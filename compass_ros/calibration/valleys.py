@@ -29,7 +29,7 @@ across them."""
 def along_valleys(likelihood: Likelihood, point: Point, linear: Linear, free: Ints, robust: float) -> Linear:
     """Differences with those along cancelling directions measured over a standard deviation to each side.
 
-    The rest stays as it is (Broyden 1965, with a measured secant for each direction).
+    Less far where a bound is nearer: a step that one parameter cannot follow is across the valley. The rest stays as it is (Broyden 1965, with a measured secant for each direction).
     """
     p = len(free)
     jacobian = linear.jacobian.reshape(linear.residual.size, p).copy()
@@ -42,7 +42,8 @@ def along_valleys(likelihood: Likelihood, point: Point, linear: Linear, free: In
         if not len(directions):
             break
         asked = directions
-        sides = [moved(likelihood, point, free, np.concatenate([s, launches])) for d in directions for s in (d, -d)]
+        steps = [within(likelihood, point, free, s) for d in directions for s in (d, -d)]
+        sides = [moved(likelihood, point, free, np.concatenate([step, launches])) for step in steps]
         residuals = cost(likelihood, sides, robust)[1].reshape(len(directions), 2, -1)
         for (up, down), there, back in zip(residuals, sides[::2], sides[1::2], strict=True):
             secant = (there.values[free] - back.values[free]) / likelihood.prior_std[free]
@@ -50,6 +51,14 @@ def along_valleys(likelihood: Likelihood, point: Point, linear: Linear, free: In
             if length > 0:
                 jacobian += np.outer(up - down - jacobian @ secant, secant) / length
     return replace(linear, jacobian=jacobian.reshape(linear.jacobian.shape))
+
+
+def within(likelihood: Likelihood, point: Point, free: Ints, step: Floats) -> Floats:
+    """(p,) of a step [standard deviations of the prior] as much as stays between the bounds."""
+    change, at = step * likelihood.prior_std[free], point.values[free]
+    room = np.where(change > 0, likelihood.high[free], likelihood.low[free]) - at
+    moving = change != 0
+    return np.asarray(step * min(1.0, float(np.min(room[moving] / change[moving], initial=1.0))))
 
 
 def _beyond(directions: Floats, asked: Floats) -> Bools:

@@ -202,7 +202,7 @@ class FirstOrder:
     def _shapes_seen(self, candidate: Candidate) -> list[Floats]:
         """(q,) shapes of a law of a sensor that has to be searched; of another one where its search begins."""
         quantities, effect = candidate.quantities, candidate.attached.effect
-        if effect.sensing is None or not any(q.grid for q in quantities):
+        if effect.sensing is None or not any(q.grid > 1 for q in quantities):
             return [np.array([0.0 if q.amplitude else q.start for q in quantities])]
         low, high, scale = _bounds(candidate)
         law, steps = self.response.bent(candidate.attached), np.zeros((len(scale), len(quantities)))

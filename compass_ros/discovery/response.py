@@ -174,7 +174,7 @@ class Response:
     def law(self, attached: Attached) -> Callable[[Floats], Floats]:
         """A law of forces as a function of its (q,) numbers: (E, K, n) accelerations in the directions it pushes in."""
         own = [np.flatnonzero(self.site_of == n) for n in self._chosen(attached)]
-        often = any(q.grid for q in attached.effect.quantities)
+        often = any(q.grid > 1 for q in attached.effect.quantities)
         states, shares = self._often if often else (self.states, None)
         states = np.ascontiguousarray(states[:, :, self._chosen(attached)])
         force = self.simulator.force_law(attached, self.values, states)

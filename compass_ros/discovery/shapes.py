@@ -28,12 +28,13 @@ def best_shapes(
     places. `evaluations`: of each simplex, for each shape. `smooth`: the gain has slopes, which lead on where there are
     more shapes than a simplex can turn about.
     """
-    shape_of = [i for i, q in enumerate(quantities) if not q.amplitude]
+    begun_at = np.array([0.0 if q.amplitude else q.start for q in quantities])
+    shape_of = [i for i, q in enumerate(quantities) if not q.amplitude and q.grid != 1]
     if not shape_of:
-        return [np.zeros(len(quantities))]
+        return [begun_at]
 
     def at(point: Floats) -> Floats:
-        shapes = np.zeros(len(quantities))
+        shapes = begun_at.copy()
         shapes[shape_of] = point
         return shapes
 

@@ -77,9 +77,14 @@ def _friction(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
     joints = _joints(spec, fitted)
     if not joints:
         return _no_joint(fitted)
+    softness, on = numbers(fitted).get("softness", 0.0), fitted.attached.objects
     for joint in joints:
         joint.frictionloss += numbers(fitted)["coefficient"]
-    return Said("coulomb_friction", fitted.attached.objects, "alike", "frictionloss is soft: what it holds creeps")
+        if softness:  # 1 / b = d_max timeconst / 2 (MuJoCo's documentation, "Computation")
+            joint.solref_friction = (2 * softness / joint.solimp_friction[1], 1.0)
+    if softness:
+        return Said("coulomb_friction", on, "exact")
+    return Said("coulomb_friction", on, "alike", "frictionloss is soft: what it holds creeps")
 
 
 def _viscous(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:

@@ -40,7 +40,7 @@ def plain(simulator: Simulator, likelihood: Likelihood) -> Hypothesis:
 @pytest.mark.parametrize(
     ("name", "numbers", "within"),
     [
-        ("coulomb_friction", [2e-4], 0.1),
+        ("coulomb_friction", [2e-4, 0.0], 0.1),
         ("quadratic_drag", [2e-4], 0.1),
         ("spring", [2e-3, 0.3, 0.0], 0.2),
         ("asymmetric_friction", [2e-4], 0.1),
@@ -80,7 +80,7 @@ def test_a_law_of_commands_is_rolled_out(tmp_path: Path) -> None:
 
 
 def test_what_is_not_there_gains_no_more_than_noise(tmp_path: Path) -> None:
-    model, candidate = planted(tmp_path, "coulomb_friction", [0.0])
+    model, candidate = planted(tmp_path, "coulomb_friction", [0.0, 0.0])
     ranked: list[Ranked] = FirstOrder(model.response).ranked(candidate)
     assert ranked[0].gain < 1e-6
 

@@ -23,7 +23,7 @@ SCENE = """<mujoco><option timestep="0.0005" gravity="0 0 -9.81"/><worldbody>
 </mujoco>"""
 STEPS = 3000
 LAWS = {
-    "coulomb_friction": (("elbow",), (0.1,), 2e-2),
+    "coulomb_friction": (("elbow",), (0.1, 0.0095), 1e-6),
     "viscous_drag": (("shoulder", "elbow"), (0.2,), 5e-3),
     "spring": (("elbow",), (1.5, 0.2, 0.0), 1e-6),
     "gravity_tilt": (("upper", "lower"), (0.05, -0.03), 1e-6),

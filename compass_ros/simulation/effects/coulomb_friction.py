@@ -1,8 +1,10 @@
 """Dry friction that does not depend on speed.
 
 F = -coefficient N v / |v|; on a joint F = -coefficient v / |v|, a torque (a force on a slide).
-Source: Coulomb friction; of bodies faded in at a creep speed, of a joint at rest whatever force below `coefficient`
-holds it there. Where a cell tunes sliding friction already, this is the same thing and so never seen.
+Source: Coulomb friction; of bodies faded in at a creep speed. A joint at rest is held by whatever force below `coefficient`
+does it. Engines soften that: with a `softness` the joint comes to rest within this time, and creeps under load, as by
+MuJoCo's `frictionloss` (0.0095 s at its defaults); 0: it stays where it is. Where a cell tunes sliding friction already,
+this is the same thing and so never seen.
 """
 
 from __future__ import annotations
@@ -13,13 +15,20 @@ from compass_ros.simulation.sites import JOINTS, LYING
 from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize
 from compass_ros.types import Floats
 
+SOFTEST_S = 0.05
+"""Longest time constant that is asked: 0.0095 s are MuJoCo's, and what takes longer than some windows between frames is
+hardly dry any more."""
+
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
-    return friction(Kind.COULOMB, context, numbers)
+    return friction(Kind.COULOMB, context, numbers[:, :1], softness=numbers[:, 1:])
 
 
 def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
-    return (Quantity("coefficient", size.force_unit, 0.0, LARGEST * size.force, MODEST * size.force),)
+    return (
+        Quantity("coefficient", size.force_unit, 0.0, LARGEST * size.force, MODEST * size.force),
+        Quantity("softness", "s", 0.0, SOFTEST_S, 0.1 * SOFTEST_S, amplitude=False, later=True, grid=1),
+    )
 
 
 EFFECT = Effect(

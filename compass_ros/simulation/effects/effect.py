@@ -44,7 +44,7 @@ class Quantity:
     """Up to where an amplitude does nothing in what was seen: of a limit, where it is the largest that was reached."""
     grid: int = 0
     """Places, evenly from low to high, that a search for a shape has to look at, where only near ones are alike; 0: a
-    few are enough."""
+    few are enough; 1: where it begins, for what no first order shows."""
 
 
 @dataclass(frozen=True)
@@ -217,17 +217,25 @@ def on_contacts(kind: Kind, context: Context, numbers: Floats) -> tuple[Term, ..
     return tuple(Term(kind, site if site.kind == "geom_pair" else None, numbers) for site in context.sites)
 
 
-def friction(kind: Kind, context: Context, before: Floats, after: Floats | None = None) -> tuple[Term, ...]:
+def friction(
+    kind: Kind, context: Context, before: Floats, after: Floats | None = None, softness: Floats | None = None
+) -> tuple[Term, ...]:
     """Terms of a friction on each site: numbers before and after the creep speed and the share of the weight.
 
     Of a body on a table both are the cell's. A body that the cell says nothing of lies with all its weight, and its
     friction is faded in at 1 mm/s. Of a joint the first number is a force; fields.c holds a joint with it against all
-    other forces, the frictions of all joints together.
+    other forces, the frictions of all joints together. `softness`: (B, 1) of a joint [s], or no column: it is hard.
     """
+    hard = np.zeros((len(before), 1))
     terms = []
     for site in context.sites:
         known = context.sliding.get(site.name) if site.kind == "table" else None
-        creep = known.creep[:, None] if known else np.full((len(before), 1), 0.0 if site.kind in JOINTS else _CREEP)
+        if known:
+            fading = known.creep[:, None]
+        elif site.kind in JOINTS:
+            fading = softness if softness is not None and softness.size else hard
+        else:
+            fading = np.full_like(hard, _CREEP)
         load = known.load[:, None] if known else np.ones((len(before), 1))
-        terms.append(Term(kind, site, np.hstack([before, creep, load, *([] if after is None else [after])])))
+        terms.append(Term(kind, site, np.hstack([before, fading, load, *([] if after is None else [after])])))
     return tuple(terms)

@@ -150,8 +150,8 @@ static Force evaluate(const Term* term, const State* s) {
   switch (term->kind) {
     case TABLE_FRICTION:   // p: friction, creep speed, share of the weight that the table carries
       return along(s, p[0] * s->weight * p[2], p[1]);
-    case COULOMB:          // p: friction (JOINT: force), creep speed, share of the weight
-      return along(s, term->object == JOINT ? p[0] : p[0] * s->weight * p[2], p[1]);
+    case COULOMB:          // p: friction (JOINT: force), creep speed (JOINT: time constant, for `hold`), share of the weight
+      return term->object == JOINT ? along(s, p[0], 0) : along(s, p[0] * s->weight * p[2], p[1]);
     case STRIBECK:         // p: extra friction at rest, creep speed, share of the weight, Stribeck speed
       return along(s, p[0] * (term->object == JOINT ? 1.0 : s->weight * p[2]) * exp(-s->speed * s->speed / (p[3] * p[3])),
                    p[1]);
@@ -401,12 +401,14 @@ static void solve_small(int n, double* a, double* x) {
 // Dry frictions of joints: the forces between their two limits with which these are at rest after the step. They come
 // after all other forces, for a joint is held against these. Those that each joint alone would not be held by are at a
 // limit at first; held ones beyond a limit go there, and are held again where they would be pushed back (block pivoting,
-// Judice and Pires 1994, which ends after two or three rounds).
+// Judice and Pires 1994, which ends after two or three rounds). A soft one is MuJoCo's own constraint of frictionloss
+// (documentation, "Computation"): a + v / tau + R F = 0 with R = (1 - d) / d of the joint's inverse inertia.
 // `most`: how many terms of a program are such frictions.
 static void hold(const mjModel* m, mjData* d, const Program* program, int most) {
   int nv = m->nv, n = 0, dofs[most], held[most], solved[most];
   double load[nv], total[nv], after[nv], unit[nv];
-  double low[most], high[most], force[most], limit[most], right[most], column[most * nv], matrix[most * most];
+  double low[most], high[most], tau[most], give[most];   // of a soft friction: time constant [s], R
+  double force[most], limit[most], right[most], column[most * nv], matrix[most * most];
   fwd_actuation(m, d);   // MuJoCo computes these two after the passive forces
   rne(m, d, 0, d->qfrc_bias);
   for (int k = 0; k < nv; k++) {
@@ -418,15 +420,20 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     if (!dry(term)) continue;
     int i = 0;
     while (i < n && dofs[i] != term->dof) i++;
-    if (i == n) dofs[n++] = term->dof, low[i] = high[i] = solved[i] = 0;
+    if (i == n) dofs[n++] = term->dof, low[i] = high[i] = tau[i] = solved[i] = 0;
+    if (term->kind == COULOMB) tau[i] = fmax(tau[i], term->number[1]);
     State s = joint_state(m, d, term);
     s.way = 1, low[i] += evaluate(term, &s).x;
     s.way = -1, high[i] += evaluate(term, &s).x;
   }
   for (int i = 0; i < n; i++) {
-    int own = m->M_rowadr[dofs[i]] + m->M_rownnz[dofs[i]] - 1;   // the diagonal is the last of a row
-    double v = d->qvel[dofs[i]], stop = -d->M[own] * v / m->opt.timestep - load[dofs[i]];
+    int dof = dofs[i], own = m->M_rowadr[dof] + m->M_rownnz[dof] - 1;   // the diagonal is the last of a row
+    double v = d->qvel[dof], hard = m->dof_solimp[mjNIMP * dof], longer = fmax(tau[i], m->opt.timestep);
     if (low[i] > high[i]) low[i] = high[i] = v > 0 ? low[i] : v < 0 ? high[i] : 0;   // less than none: along the motion
+    give[i] = (1 - hard) / hard * m->dof_invweight0[dof] * tau[i] / longer;
+    tau[i] = longer;
+    double own_give = d->M[own] * give[i], middle = (low[i] + high[i]) / 2;
+    double stop = (own_give * middle - d->M[own] * v / tau[i] - load[dof]) / (1 + own_give);
     limit[i] = stop < low[i] ? low[i] : stop > high[i] ? high[i] : NAN;   // not a number: held
   }
   for (int round = 0, changed = 1; changed && round < 3 * n + 3; round++) {
@@ -439,10 +446,11 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     for (int r = 0; r < h; r++) {
       int i = held[r], dof = dofs[i];
       if (!solved[i]) unit[dof] = 1, solve_m(m, d, column + i * nv, unit, 1), unit[dof] = 0, solved[i] = 1;
-      right[r] = -d->qvel[dof] / m->opt.timestep - after[dof];
+      right[r] = -d->qvel[dof] / tau[i] - after[dof] + give[i] * (low[i] + high[i]) / 2;
     }
     for (int r = 0; r < h; r++)
-      for (int c = 0; c < h; c++) matrix[r * h + c] = column[held[c] * nv + dofs[held[r]]];
+      for (int c = 0; c < h; c++)
+        matrix[r * h + c] = column[held[c] * nv + dofs[held[r]]] + (r == c ? give[held[r]] : 0);
     solve_small(h, matrix, right);
     changed = 0;
     for (int r = 0; r < h; r++) {
@@ -453,9 +461,9 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     }
     if (changed) continue;
     for (int i = 0; i < n; i++) {
-      double moving = d->qvel[dofs[i]] / m->opt.timestep + after[dofs[i]];
+      double moving = d->qvel[dofs[i]] / tau[i] + after[dofs[i]], creeps = give[i] * (high[i] - low[i]) / 2;
       if (isnan(limit[i]) || low[i] == high[i]) continue;
-      if (limit[i] == low[i] ? moving < 0 : moving > 0) limit[i] = NAN, changed = 1;
+      if (limit[i] == low[i] ? moving < creeps : moving > -creeps) limit[i] = NAN, changed = 1;
     }
   }
   for (int i = 0; i < n; i++) d->qfrc_passive[dofs[i]] += fmax(low[i], fmin(high[i], force[i]));

@@ -91,6 +91,55 @@ def test_friction_lets_go_above_it(law: str, numbers: tuple[float, ...]) -> None
     assert position - 0.3 > 0.5 * 0.009 / INERTIA * 1.0**2
 
 
+SOFT_S = 0.95 * 0.02 / 2
+"""Time constant of MuJoCo's frictionloss at its defaults: 1 / b with b = 2 / (d_max timeconst)."""
+
+
+@pytest.mark.parametrize("step", [1e-3, 4e-3])
+@pytest.mark.parametrize("start", [-0.6, 0.5])
+def test_soft_friction_is_what_mujoco_calls_frictionloss(start: float, step: float) -> None:
+    model = axis('<position name="s" joint="axis" kp="4" kv=".4"/>', step=step)
+    held, ours = (
+        moved(model, laws(("coulomb_friction", (0.2, softness), "axis")), (start, 0.0), 3.0) for softness in (0, SOFT_S)
+    )
+    model.dof_frictionloss[0] = 0.2
+    theirs = moved(model, laws(), (start, 0.0), 3.0)
+    assert abs(theirs[0]) > 0.02  # it sticks beside the target
+    assert abs(held[0] - theirs[0]) > 0.005
+    np.testing.assert_allclose(ours, theirs, atol=1e-6)
+
+
+def test_soft_frictions_of_coupled_joints_are_mujocos_too() -> None:
+    chain = "".join(
+        f'<body pos="{0.3 * (i > 0)} 0 0"><joint name="j{i}" axis="0 1 0"/>'
+        '<inertial pos="0.15 0 0" mass="0.5" diaginertia=".004 .004 .004"/>'
+        for i in range(3)
+    )
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="0.001"/><worldbody>{chain}{"</body>" * 3}</worldbody></mujoco>'
+    )
+    most, ends = (1.0, 0.5, 0.2), []
+    for mine in (False, True):
+        model.dof_frictionloss[:] = 0.0 if mine else most
+        given = laws(*(("coulomb_friction", (f * mine, SOFT_S), f"j{i}") for i, f in enumerate(most)))
+        data = mujoco.MjData(model)
+        with attach(model, data, given):
+            mujoco.mj_step(model, data, nstep=1500)
+        ends.append(data.qpos.copy())
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-3)
+
+
+@pytest.mark.parametrize("share", [-0.7, 0.3])
+def test_a_joint_creeps_in_proportion_to_what_pulls_at_it(share: float) -> None:
+    """At rest v / tau + R F = 0, R = (1 - d) / (d I) with d = 0.9."""
+    model = axis('<motor name="m" joint="axis"/>', step=1e-3)
+    given = laws(("coulomb_friction", (0.2, 0.02), "axis"))
+    position, rate = moved(model, given, (0.3, 0.0), 5.0, told=0.2 * share)
+    creep = 0.02 * (0.1 / 0.9 / INERTIA) * 0.2 * share
+    assert rate == pytest.approx(creep, rel=1e-6)
+    assert position - 0.3 == pytest.approx(5.0 * creep, rel=1e-2)
+
+
 @pytest.mark.parametrize("speed", [0.0, 0.1])
 def test_coupled_joints_are_held_together(speed: float) -> None:
     """Three links under gravity, each held by friction above its weight's torque: they come to rest and stay there."""
