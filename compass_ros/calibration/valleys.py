@@ -29,7 +29,8 @@ across them."""
 def along_valleys(likelihood: Likelihood, point: Point, linear: Linear, free: Ints, robust: float) -> Linear:
     """Differences with those along cancelling directions measured over a standard deviation to each side.
 
-    Less far where a bound is nearer: a step that one parameter cannot follow is across the valley. The rest stays as it is (Broyden 1965, with a measured secant for each direction).
+    Less far where a bound is nearer: a step that one parameter cannot follow is across the valley. The rest stays as it
+    is (Broyden 1965, with a measured secant for each direction).
     """
     p = len(free)
     jacobian = linear.jacobian.reshape(linear.residual.size, p).copy()

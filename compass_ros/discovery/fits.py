@@ -97,7 +97,8 @@ def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:
     moved = ranked.columns @ (beyond / sizes)
     beside = replace(tangent, residual=tangent.residual + moved)
     change = np.zeros(len(parent.fit.free))
-    change[parent.response.inside] = solve(beside, beside.normal, None).parameters
+    inside = parent.response.inside
+    change[inside] = solve(beside, beside.normal, None).parameters[: len(inside)]
     return change
 
 

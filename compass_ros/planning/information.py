@@ -93,7 +93,7 @@ class Information:
 def information(response: Response, candidates: Sequence[Candidate]) -> Information:
     """Tangents of all candidates around a fit; effects that are no force cost one rollout a quantity and shot."""
     columns: list[Column] = []
-    tangents: list[Floats] = [response.tangent.parameters]
+    tangents: list[Floats] = [response.tangent.parameters[:, :, : len(response.inside)]]
     for i, candidate in enumerate(candidates):
         for case, (quantities, of_case) in enumerate(_cases(response, candidate)):
             columns.extend(Column(i, case, q) for q in quantities)

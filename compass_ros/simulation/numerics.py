@@ -10,9 +10,8 @@ from compass_ros.simulation.simulator import Simulator
 
 
 def other_numerics(simulator: Simulator) -> Iterator[tuple[str, Mapping[str, float]]]:
-    """What changes, in words, and the options of a `Simulator` that has it: time step, friction cone, solver."""
+    """What changes, in words, and the options of a `Simulator` that has it: friction cone, solver."""
     option = simulator.options
-    yield f"half the time step ({500 * option.timestep:g} ms)", {"timestep": 0.5 * option.timestep}
     pyramid, cone = mujoco.mjtCone.mjCONE_PYRAMIDAL, mujoco.mjtCone.mjCONE_ELLIPTIC
     if option.cone == pyramid:
         yield "an elliptic friction cone", {"cone": int(cone)}

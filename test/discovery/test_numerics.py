@@ -1,11 +1,13 @@
-"""What another time step explains is said to be that; drag is not."""
+"""What a finer time step explains is no evidence for anything; drag is no numerics."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from compass_ros.discovery.evidence import evidences
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.numerics import numerics_as_model
 from compass_ros.discovery.planned import perfect
@@ -21,11 +23,18 @@ def cause(response: Response) -> str:
     return numerics_as_model(plain, plain.free.log - plain.free.alone)
 
 
-def test_a_finer_time_step_is_told_from_physics() -> None:
-    clean = perfect(simulator(), CALM, RATE, 0.01 * SIGMA)
-    finer = Simulator(cell(), options={"timestep": 0.5 * simulator().time_step})
+@pytest.mark.parametrize(("share", "noise"), [(0.5, 0.01), (0.125, 0.1)])
+def test_a_finer_time_step_calls_for_nothing(share: float, noise: float) -> None:
+    clean = perfect(simulator(), CALM, RATE, noise * SIGMA)
+    finer = Simulator(cell(), options={"timestep": share * simulator().time_step})
     measured = finer.observe(np.tile(simulator().defaults, (len(CALM), 1)), CALM, clean.time_s)
-    assert "half the time step (0.5 ms)" in cause(response_of(replace(clean, measured=measured)))
+    response = response_of(replace(clean, measured=measured))
+    plain = Hypothesis((), response.simulator, response.likelihood, response.fit)
+    blind = replace(
+        response.tangent, parameters=response.tangent.parameters[:, :, :-1], away=response.tangent.away[:-1]
+    )
+    assert plain.free.log - plain.free.alone < 0
+    assert evidences(response.tangent, [None])[0].log > evidences(blind, [None])[0].log + 5
 
 
 def test_missing_drag_is_no_numerics() -> None:

@@ -75,9 +75,11 @@ def steps(count: int) -> Floats:
     return np.random.default_rng(5).uniform(-1.2, 1.2, (count, 4))
 
 
-def ranked(simulator: Simulator, attached: Attached, size: float) -> tuple[tuple[Candidate, ...], list[Ranked]]:
+def ranked(
+    simulator: Simulator, attached: Attached, numbers: list[float]
+) -> tuple[tuple[Candidate, ...], list[Ranked]]:
     """Laws to first order about a simulator that lacks one, with both dampings free."""
-    likelihood = robots.recorded(simulator, [attached], [size], steps(4))
+    likelihood = robots.recorded(simulator, [attached], numbers, steps(4))
     point, free = start(likelihood, simulator.defaults), np.arange(len(simulator.parameters))
     fit = Fit(point, linearise(likelihood, point, free, np.full(len(free), 1e-3)), free, 1e4 * ROBUST, 0, True)
     response = respond(simulator, likelihood, fit)
@@ -89,7 +91,7 @@ def ranked(simulator: Simulator, attached: Attached, size: float) -> tuple[tuple
 def test_a_wrong_number_is_ranked_first_with_its_size(tmp_path: Path, name: str) -> None:
     """Against all laws and all other numbers, where it is a fiftieth as far off as in the verdicts: first order."""
     simulator, size = Simulator(arm(tmp_path), threads=1), PLANTED[name] / 50
-    _, found = ranked(simulator, law(simulator, name), size)
+    _, found = ranked(simulator, law(simulator, name), [size])
     best = next(r for r in found if len(r.candidate.parts) == 1)
     assert (best.candidate.name, best.candidate.objects) == ("parameter", (name,))
     assert best.numbers[0] == pytest.approx(size, rel=0.1)
@@ -98,7 +100,7 @@ def test_a_wrong_number_is_ranked_first_with_its_size(tmp_path: Path, name: str)
 def test_where_a_law_is_true_no_number_is_first(tmp_path: Path) -> None:
     simulator = Simulator(arm(tmp_path), threads=1)
     coulomb = Attached(effect("coulomb_friction").at(unit_joint("hinge")), ("elbow",))
-    asked, found = ranked(simulator, coulomb, 0.002)
+    asked, found = ranked(simulator, coulomb, [0.002, 0.0])
     assert "parameter" in {c.name for c in asked}
     assert (found[0].candidate.name, found[0].candidate.objects) == ("coulomb_friction", ("elbow",))
 
@@ -121,7 +123,7 @@ def test_what_is_listed_is_not_asked_and_what_does_the_same_once(tmp_path: Path)
 def test_each_number_is_a_law_of_its_own(tmp_path: Path) -> None:
     """A number is one choice of all numbers; two of them are two laws, and never one on several."""
     simulator = Simulator(arm(tmp_path), threads=1)
-    asked, found = ranked(simulator, law(simulator, "lower@dyna@mass"), 0.003)
+    asked, found = ranked(simulator, law(simulator, "lower@dyna@mass"), [0.003])
     prior = Prior.of(asked)
     assert prior.sites["parameter"] == sum(c.name == "parameter" for c in asked)
     assert prior.of_laws(["parameter", "parameter"]) == pytest.approx(2 * prior.of_laws(["parameter"]))

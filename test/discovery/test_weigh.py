@@ -138,7 +138,7 @@ def test_a_law_that_stood_for_another_is_exchanged(tmp_path: Path, monkeypatch: 
     cell = servo(tmp_path)
     given: list[tuple[Any, ...]] = []
     laws = [on_axis("coulomb_friction"), Attached(effect("actuation_delay"), ())]
-    episodes = recorded(cell, laws, [0.08, 0.03])
+    episodes = recorded(cell, laws, [0.08, 0.0, 0.03])
 
     def kept(*asked: Any) -> Found:
         given.append(asked)

@@ -1,10 +1,10 @@
 """Dry friction that does not depend on speed.
 
 F = -coefficient N v / |v|; on a joint F = -coefficient v / |v|, a torque (a force on a slide).
-Source: Coulomb friction; of bodies faded in at a creep speed. A joint at rest is held by whatever force below `coefficient`
-does it. Engines soften that: with a `softness` the joint comes to rest within this time, and creeps under load, as by
-MuJoCo's `frictionloss` (0.0095 s at its defaults); 0: it stays where it is. Where a cell tunes sliding friction already,
-this is the same thing and so never seen.
+Source: Coulomb friction; of bodies faded in at a creep speed. A joint at rest is held by whatever force below
+`coefficient` does it. Engines soften that: with a `softness` the joint comes to rest within this time, and creeps under
+load, as by MuJoCo's `frictionloss` (0.0095 s at its defaults); 0: it stays where it is. Where a cell tunes sliding
+friction already, this is the same thing and so never seen.
 """
 
 from __future__ import annotations
