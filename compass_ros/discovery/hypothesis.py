@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import sqrt
 
 import numpy as np
 
@@ -145,14 +146,21 @@ class Hypothesis:
             yield attached, slice(at, at + size)
             at += size
 
-    @cached_property
-    def weak(self) -> tuple[Attached, ...]:
-        """Its laws that lie within ERROR_BARS of zero, all amplitudes of one together.
+    @property
+    def weakest(self) -> Attached | None:
+        """Of its laws that lie within ERROR_BARS of zero the one that lies nearest: those that do nearly the same are
+        each unsure beside the other."""
+        nearest, weakest = min(self.error_bars, key=lambda pair: pair[0], default=(np.inf, None))
+        return weakest if nearest < ERROR_BARS else None
 
-        Error bars as the noise leaves them, and as the episodes disagree, with the shapes as they are: at zero these
-        mean nothing, and an amplitude may be unsure because its shape is. Along directions of which the recordings say
-        less than the prior nothing is judged: where only ratios show, all numbers are unsure by one common factor, and
-        none of them is near zero for that. A scatter is judged by its episodes.
+    @cached_property
+    def error_bars(self) -> tuple[tuple[float, Attached], ...]:
+        """How many error bars from zero each law lies, all its amplitudes together; none of chance among them.
+
+        The longer ones of those that the noise leaves and those by which the episodes disagree, with the shapes as they
+        are: at zero these mean nothing, and an amplitude may be unsure because its shape is. Along directions of which
+        the recordings say less than the prior nothing is judged: where only ratios show, all numbers are unsure by one
+        common factor, and none of them is near zero for that. A scatter is judged by its episodes.
         """
         fit = self._with_shapes_held
         free, p = fit.free, len(fit.free)
@@ -163,12 +171,12 @@ class Hypothesis:
         axes = axes[:, told > 1.0]
         away = ((fit.point.values - self.likelihood.prior_mean) / self.likelihood.prior_std)[free]
         bars = [axes.T @ cov @ axes for cov in (errors, jackknife(self.likelihood, fit))]
-        out = []
+        far: list[tuple[float, Attached]] = []
         for attached, numbers in self.own():
             own = np.isin(free, numbers.start + np.flatnonzero(attached.amplitudes))
-            if not attached.effect.scattered and any(_within(away[own], axes[own] @ c @ axes[own].T) for c in bars):
-                out.append(attached)
-        return tuple(out)
+            if not attached.effect.scattered:
+                far.append((min(_far(away[own], axes[own] @ c @ axes[own].T) for c in bars), attached))
+        return tuple(far)
 
     @property
     def _with_shapes_held(self) -> Fit:
@@ -204,6 +212,8 @@ def widened(simulator: Simulator, likelihood: Likelihood, added: Sequence[Attach
     )
 
 
-def _within(away: Floats, errors: Floats) -> bool:
-    """Whether (n,) amplitudes are within ERROR_BARS of zero, with their (n, n) errors."""
-    return bool(away @ np.linalg.lstsq(errors, away, rcond=None)[0] < ERROR_BARS**2) and bool(np.any(errors))
+def _far(away: Floats, errors: Floats) -> float:
+    """How many error bars (n,) amplitudes are from zero, with (n, n) errors; infinitely many where these are 0."""
+    if not np.any(errors):
+        return np.inf
+    return sqrt(max(float(away @ np.linalg.lstsq(errors, away, rcond=None)[0]), 0.0))

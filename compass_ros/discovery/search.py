@@ -88,15 +88,16 @@ def finish(known: Known, others: Sequence[float]) -> None:
     What a fit still lacks there, and rough differences, are worth some units of log evidence: as much as two laws may
     be apart, or a discrepancy may stand for; and first order is what it says about an optimum alone. A model with a law
     that is within its error bars of zero, as the noise leaves them or as the episodes disagree on it
-    (`Hypothesis.weak`), is the model without that law, and stands for it. `others`: log odds of models without a law.
+    (`Hypothesis.weakest`), is the model without that law, and stands for it: laws go one by one, since each is unsure
+    beside another that does nearly the same. `others`: log odds of models without a law.
     """
     while (name := _unfinished(known, others)) is not None:
         model = finished(known.models.pop(name)[0])
         known.finished.add(name)
-        if not model.weak:
+        if (weakest := model.weakest) is None:
             known.models[name] = model, known.odds(model, model.log_evidence)
-        elif len(model.weak) < len(model.laws):
-            less = without(model, model.weak)
+        elif len(model.laws) > 1:
+            less = without(model, [weakest])
             if less.name not in known.models:
                 known.take([less])
 
