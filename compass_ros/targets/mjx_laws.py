@@ -196,7 +196,7 @@ def _evaluate(term: Term, s: _State) -> tuple[Any, Any, Any]:  # noqa: PLR0911, 
     match term.kind:
         case "table_friction":  # friction, creep speed, share of the weight that the table carries
             return _along(s, p[0] * s.weight * p[2], p[1])
-        case "coulomb":  # friction (joint: force), creep speed (joint: softness, which is left out), share of the weight
+        case "coulomb":  # friction (joint: force), creep speed (joint: softness, left out), share of the weight
             return _dry(s, p[0] * weight * (1.0 if joint else p[2]), 0.0 if joint else p[1])
         case "stribeck":  # extra friction at rest, creep speed, share of the weight, Stribeck speed
             square = s.vx * s.vx + s.vy * s.vy + s.vz * s.vz
