@@ -55,6 +55,16 @@ def test_what_is_left_where_parameters_cancel_is_measured(own: float) -> None:
     assert error[1] < 0.1 * error[0]
 
 
+def test_a_step_along_a_valley_ends_at_the_bound_that_it_meets() -> None:
+    """One of two dampings that add up lies near its bound: a step that it cannot follow would be a step of the sum."""
+    given = damped(0.0)
+    second = given.parameters[1]
+    near = replace(given, parameters=(given.parameters[0], replace(second, low=0.15)))
+    point, both = start(near, np.array([0.8, 0.2])), np.arange(2)
+    measured = along_valleys(near, point, linearise(near, point, both, np.full(2, 1e-3)), both, robust=4.0)
+    assert np.linalg.norm(across(measured)) < 5.0  # 0 but for the roughness; beyond the bound it would be 50
+
+
 def across(linear: Linear) -> Floats:
     """(E, F) change of the residual as one damping grows for the other."""
     return np.asarray((linear.jacobian @ ACROSS)[..., 0])
