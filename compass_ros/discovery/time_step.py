@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-
-import numpy as np
+from dataclasses import replace
 
 from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.residuals import residual_at
 from compass_ros.simulation import Simulator
 from compass_ros.types import Floats
 
@@ -24,7 +24,4 @@ def finite_step(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> Float
 def moved_by(simulator: Simulator, likelihood: Likelihood, fit: Fit, options: Mapping[str, float]) -> Floats:
     """(E, F, C) change of the residual by other numerics [sigma]; 0 where nothing was measured."""
     other = Simulator(simulator.cell, simulator.effects, simulator.threads, options).driven(simulator.physics.bank)
-    values = np.tile(fit.point.values, (len(likelihood.inputs), 1))
-    inputs = likelihood.inputs + fit.point.launch
-    change = other.observe(values, inputs, likelihood.time_s) - simulator.observe(values, inputs, likelihood.time_s)
-    return np.where(np.isnan(likelihood.measured), 0.0, np.nan_to_num(change) / likelihood.sigma)
+    return residual_at(replace(likelihood, predict=other.observe), fit.point) - fit.linear.residual

@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from compass_ros.calibration.cost import start
+from compass_ros.calibration.differences import linearise
+from compass_ros.calibration.least_squares import Fit
+from compass_ros.cells import load
 from compass_ros.discovery.evidence import evidences
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.numerics import numerics_as_model
 from compass_ros.discovery.planned import perfect
 from compass_ros.discovery.response import Response
+from compass_ros.discovery.time_step import finite_step
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
+from compass_ros.simulation.manifold import apart, charted
 from test.discovery.planted import CALM, PUCKS, RATE, SIGMA, recorded, response_of
 from test.simulation.table import cell, simulator
 
@@ -39,3 +47,23 @@ def test_a_finer_time_step_calls_for_nothing(share: float, noise: float) -> None
 
 def test_missing_drag_is_no_numerics() -> None:
     assert cause(response_of(recorded(Attached(EFFECTS["viscous_drag"], PUCKS), [0.3]))) == ""
+
+
+def test_the_time_step_turns_an_orientation_by_an_angle() -> None:
+    """A cube that falls on a corner: half the step turns it by the angle between both orientations, twice over."""
+    cube = load("cube_toss")
+    coarse = Simulator(cube, threads=1)
+    inputs = np.zeros((1, len(cube.input_names)))
+    inputs[0, :10] = [0, 0, 0.07, 1, 0, 0, 0, 0.5, 0, -1.5]
+    inputs[0, 10:13] = [3.0, -5.0, 4.0]
+    seen = perfect(coarse, coarse.inputs(inputs), 148.0, SIGMA)
+    likelihood = replace(seen, measured=charted(cube, seen.measured), difference=partial(apart, cube))
+    point, free = start(likelihood, coarse.defaults), np.arange(2)
+    fit = Fit(point, linearise(likelihood, point, free, np.full(2, 1e-3)), free, 4.0, 0, True)
+    finer = Simulator(cube, threads=1, options={"timestep": 0.5 * coarse.time_step})
+    turned = finer.observe(coarse.defaults[None], likelihood.inputs, likelihood.time_s)[0, :, 3:7]
+    from_, to = (Rotation.from_quat(q, scalar_first=True) for q in (seen.measured[0, :, 3:7], turned))
+    angle = (from_.inv() * to).magnitude()
+    found = SIGMA * finite_step(coarse, likelihood, fit)[0, :, 3:7]
+    assert angle.max() > 1e-3
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 2 * angle, atol=1e-9)

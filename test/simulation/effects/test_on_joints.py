@@ -42,10 +42,9 @@ def first_order(folder: Path, kind: str, law: str, force: float, length: float, 
 @pytest.mark.parametrize("kind", ["hinge", "slide"])
 @pytest.mark.parametrize("law", ["coulomb_friction", "viscous_drag", "quadratic_drag", "spring"])
 def test_first_order_finds_the_size_that_was_planted(tmp_path: Path, kind: str, law: str, gravity: bool) -> None:
-    """Beside a time step that does up to a few per cent of it."""
     share, gain = first_order(tmp_path, kind, law, 1.0, 1.0, gravity)
-    assert share == pytest.approx(1, abs=0.05)
-    assert gain > 25
+    assert share == pytest.approx(1, abs=0.03)
+    assert gain > 40
 
 
 @pytest.mark.parametrize("kind", ["hinge", "slide"])
@@ -53,8 +52,8 @@ def test_first_order_finds_the_size_that_was_planted(tmp_path: Path, kind: str, 
 def test_units_change_nothing(tmp_path: Path, kind: str, law: str) -> None:
     found = [first_order(tmp_path, kind, law, force, length, True) for force, length in UNITS]
     share, gain = np.array(found).T
-    np.testing.assert_allclose(share, share[0], rtol=1e-2)
-    np.testing.assert_allclose(gain, gain[0], rtol=1e-2)
+    np.testing.assert_allclose(share, share[0], rtol=5e-3)
+    np.testing.assert_allclose(gain, gain[0], rtol=5e-3)
 
 
 @pytest.mark.parametrize(("force", "length"), UNITS)
