@@ -49,19 +49,30 @@ def best_shapes(
     for i in np.argsort(falls, kind="stable"):
         if len(begun) < starts and all(np.abs(nodes[i] - nodes[k]).max() > 1 for k in begun):
             begun.append(int(i))
-    bounds = np.array([(quantities[i].low, quantities[i].high) for i in shape_of])
-    wide = np.ptp(bounds, axis=1)
+    low, high = np.array([(quantities[i].low, quantities[i].high) for i in shape_of]).T
+    wide = high - low
+    bounds = np.stack([low, high], axis=1) / wide[:, None]
     options = {"maxfev": evaluations * len(shape_of), "xatol": 1e-4, "fatol": 1e-2}
-    searched = [bool(quantities[i].grid) for i in shape_of]
+    on_grids = all(quantities[i].grid for i in shape_of)
+
+    def corners(begins: Floats) -> dict[str, Floats]:
+        near = np.array([0.5 * (grid[1] - grid[0]) for grid in grids]) / wide
+        return {"initial_simplex": np.vstack([begins, begins + np.diag(near)])}
 
     def down(point: Floats) -> OptimizeResult:
-        """Where all shapes are searched on grids, from a simplex within these; else from SciPy's own."""
+        """In shares of the ranges: where all shapes are searched on grids, from a simplex within these."""
+        begins = point / wide
         if smooth:
-            found = minimize(lambda x: fall(x * wide), point / wide, method="L-BFGS-B", bounds=bounds / wide[:, None])
-            return OptimizeResult(x=found.x * wide, fun=found.fun)
-        near = [0.5 * float(np.diff(grid)[0]) for grid in grids] if all(searched) else []
-        corners = {"initial_simplex": np.vstack([point, point + np.diag(near)])} if near else {}
-        return minimize(fall, point, method="Nelder-Mead", bounds=bounds, options=options | corners)
+            found = minimize(lambda x: fall(x * wide), begins, method="L-BFGS-B", bounds=bounds)
+        else:
+            found = minimize(
+                lambda x: fall(x * wide),
+                begins,
+                method="Nelder-Mead",
+                bounds=bounds,
+                options=options | (corners(begins) if on_grids else {}),
+            )
+        return OptimizeResult(x=found.x * wide, fun=found.fun)
 
     found = [down(points[i]) for i in begun]
     apart = APART * wide

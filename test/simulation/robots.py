@@ -39,6 +39,7 @@ def robot(
     length: float = 1.0,
     gravity: bool = True,
     tracked: int | None = None,
+    step_ms: float = 1.0,
 ) -> Cell:
     """A chain of `hinge`s and `slide`s, each joint j0, j1, ... of a body of its own; drive d0 on j0, ...
 
@@ -61,7 +62,7 @@ def robot(
         for i, drive in enumerate(drives)
     ]
     g = -9.81 * length if gravity else 0.0
-    scene = f"""<mujoco><option timestep="0.001" integrator="implicitfast" gravity="0 0 {g:g}"/>
+    scene = f"""<mujoco><option timestep="{1e-3 * step_ms:g}" integrator="implicitfast" gravity="0 0 {g:g}"/>
         <worldbody>{links}{ends}</worldbody><actuator>{"".join(filled)}</actuator></mujoco>"""
     names = [f"j{i}" for i in range(len(joints) if tracked is None else tracked)]
     objects = [{"name": name, "quantity": "joint"} for name in names]
