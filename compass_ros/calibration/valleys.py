@@ -43,7 +43,7 @@ def along_valleys(likelihood: Likelihood, point: Point, linear: Linear, free: In
         if not len(directions):
             break
         asked = directions
-        steps = [within(likelihood, point, free, s) for d in directions for s in (d, -d)]
+        steps = [_within(likelihood, point, free, s) for d in directions for s in (d, -d)]
         sides = [moved(likelihood, point, free, np.concatenate([step, launches])) for step in steps]
         residuals = cost(likelihood, sides, robust)[1].reshape(len(directions), 2, -1)
         for (up, down), there, back in zip(residuals, sides[::2], sides[1::2], strict=True):
@@ -54,7 +54,7 @@ def along_valleys(likelihood: Likelihood, point: Point, linear: Linear, free: In
     return replace(linear, jacobian=jacobian.reshape(linear.jacobian.shape))
 
 
-def within(likelihood: Likelihood, point: Point, free: Ints, step: Floats) -> Floats:
+def _within(likelihood: Likelihood, point: Point, free: Ints, step: Floats) -> Floats:
     """(p,) of a step [standard deviations of the prior] as much as stays between the bounds."""
     change, at = step * likelihood.prior_std[free], point.values[free]
     room = np.where(change > 0, likelihood.high[free], likelihood.low[free]) - at

@@ -22,14 +22,15 @@ SCENE = """<mujoco><option timestep="0.0005" gravity="0 0 -9.81"/><worldbody>
 <actuator><position name="servo" joint="shoulder" kp="30" kv="1"/><motor name="motor" joint="elbow"/></actuator>
 </mujoco>"""
 STEPS = 3000
-LAWS = {
-    "coulomb_friction": (("elbow",), (0.1, 0.0095), 1e-6),
-    "viscous_drag": (("shoulder", "elbow"), (0.2,), 5e-3),
-    "spring": (("elbow",), (1.5, 0.2, 0.0), 1e-6),
-    "gravity_tilt": (("upper", "lower"), (0.05, -0.03), 1e-6),
-    "payload": (("lower",), (0.4, 0.02, 0.01, -0.1), 1e-6),
-    "quadratic_drag": (("elbow",), (0.03,), 5e-3),
-}
+LAWS = [
+    ("coulomb_friction", ("elbow",), (0.1, 0.0), 2e-2),
+    ("coulomb_friction", ("elbow",), (0.1, 0.02), 1e-6),
+    ("viscous_drag", ("shoulder", "elbow"), (0.2,), 5e-3),
+    ("spring", ("elbow",), (1.5, 0.2, 0.0), 1e-6),
+    ("gravity_tilt", ("upper", "lower"), (0.05, -0.03), 1e-6),
+    ("payload", ("lower",), (0.4, 0.02, 0.01, -0.1), 1e-6),
+    ("quadratic_drag", ("elbow",), (0.03,), 5e-3),
+]
 """Sites, numbers, and how far the two may be apart in 1.5 s of free swing [rad]."""
 
 
@@ -72,9 +73,10 @@ def swing(path: Path, controls: Floats, laws: Exported | None = None) -> Floats:
         return play()
 
 
-@pytest.mark.parametrize("name", LAWS)
-def test_plain_mjcf_moves_as_the_law_does(name: str, scene: Path, tmp_path: Path) -> None:
-    on, values, apart = LAWS[name]
+@pytest.mark.parametrize(("name", "on", "values", "apart"), LAWS)
+def test_plain_mjcf_moves_as_the_law_does(
+    name: str, on: tuple[str, ...], values: tuple[float, ...], apart: float, scene: Path, tmp_path: Path
+) -> None:
     laws, controls = exported(fitted(name, on, values)), np.zeros((STEPS, 2))
     (said,) = write_plain(scene, laws, (), tmp_path / "plain.xml")
     with_law, plain, bare = (

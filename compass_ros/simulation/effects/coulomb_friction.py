@@ -16,8 +16,8 @@ from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize
 from compass_ros.types import Floats
 
 SOFTEST_S = 0.05
-"""Longest time constant that is asked: 0.0095 s are MuJoCo's, and what takes longer than some windows between frames is
-hardly dry any more."""
+"""Longest time constant that is asked. A shape's prior is a quarter of its range wide (`hypothesis.widened`), 0.0125 s
+here: friction that holds (0) and MuJoCo's own (0.0095 s) are both within one standard deviation of it."""
 
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:

@@ -25,6 +25,18 @@ def axis(actuator: str = "", kind: str = "hinge", step: float = 1e-4) -> mujoco.
     )
 
 
+def three_links(step: float) -> mujoco.MjModel:
+    """Joints j0 to j2 under gravity, without drives."""
+    chain = "".join(
+        f'<body pos="{0.3 * (i > 0)} 0 0"><joint name="j{i}" axis="0 1 0"/>'
+        '<inertial pos="0.15 0 0" mass="0.5" diaginertia=".004 .004 .004"/>'
+        for i in range(3)
+    )
+    return mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="{step}"/><worldbody>{chain}{"</body>" * 3}</worldbody></mujoco>'
+    )
+
+
 def laws(*given: tuple[str, tuple[float, ...], str]) -> Exported:
     return Exported(tuple(FittedEffect(Attached(effect(n), (on,)), numbers, ()) for n, numbers, on in given), {})
 
@@ -110,14 +122,7 @@ def test_soft_friction_is_what_mujoco_calls_frictionloss(start: float, step: flo
 
 
 def test_soft_frictions_of_coupled_joints_are_mujocos_too() -> None:
-    chain = "".join(
-        f'<body pos="{0.3 * (i > 0)} 0 0"><joint name="j{i}" axis="0 1 0"/>'
-        '<inertial pos="0.15 0 0" mass="0.5" diaginertia=".004 .004 .004"/>'
-        for i in range(3)
-    )
-    model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><option timestep="0.001"/><worldbody>{chain}{"</body>" * 3}</worldbody></mujoco>'
-    )
+    model = three_links(0.001)
     most, ends = (1.0, 0.5, 0.2), []
     for mine in (False, True):
         model.dof_frictionloss[:] = 0.0 if mine else most
@@ -143,14 +148,7 @@ def test_a_joint_creeps_in_proportion_to_what_pulls_at_it(share: float) -> None:
 @pytest.mark.parametrize("speed", [0.0, 0.1])
 def test_coupled_joints_are_held_together(speed: float) -> None:
     """Three links under gravity, each held by friction above its weight's torque: they come to rest and stay there."""
-    chain = "".join(
-        f'<body pos="{0.3 * (i > 0)} 0 0"><joint name="j{i}" axis="0 1 0"/>'
-        '<inertial pos="0.15 0 0" mass="0.5" diaginertia=".004 .004 .004"/>'
-        for i in range(3)
-    )
-    model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><option timestep="0.002"/><worldbody>{chain}{"</body>" * 3}</worldbody></mujoco>'
-    )
+    model = three_links(0.002)
     data = mujoco.MjData(model)
     data.qvel[:] = speed
     given = laws(*(("coulomb_friction", (most,), f"j{i}") for i, most in enumerate((8.0, 4.0, 1.2))))
