@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -19,6 +18,7 @@ from compass_ros.errors import DataError
 from compass_ros.estimation import estimate_parameters
 from compass_ros.posing import Posed
 from compass_ros.progress import Steady
+from compass_ros.selection import evenly, split, unlike
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import recordings
 from compass_ros.simulation.windows import usable, windows
@@ -55,8 +55,8 @@ def calibrate(
         return replace(one, warnings=(*told, *checked.said, *one.warnings), left_out=left_out)
 
     fit, held_out = split(used, config)
-    most = config.windows if cell.spec.windows else config.episodes
-    data = recordings(cell, evenly(windows(cell, fit), most))
+    fitted = unlike(cell, windows(cell, fit), config.windows) if cell.spec.windows else evenly(fit, config.episodes)
+    data = recordings(cell, fitted)
     judge = recordings(cell, evenly(windows(cell, held_out or fit), config.episodes)).numbered(len(data.names))
     simulator = simulator.driven(data.drives + judge.drives)
     noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
@@ -99,28 +99,3 @@ def searched(
         return not_evaluated(str(error))
     except np.linalg.LinAlgError as error:
         return fit_failed(f"a step of the search has no solution ({error})")
-
-
-def evenly(episodes: Sequence[Episode], most: int) -> list[Episode]:
-    """All episodes where they are not more than `most`; else so many of them, evenly over the order of recording.
-
-    A calibration's time and memory grow with its episodes, its error bars shrink with their square root.
-    """
-    ordered = sorted(episodes, key=lambda e: (e.start_ns, e.name, e.source))
-    if len(ordered) <= most:
-        return ordered
-    return [ordered[i] for i in np.round(np.linspace(0, len(ordered) - 1, most)).astype(int)]
-
-
-def split(episodes: Sequence[Episode], config: CalibrationConfig) -> tuple[list[Episode], list[Episode]]:
-    """Episodes to fit and episodes that are opened after the verdict; the choice depends on names and seed alone."""
-    if not episodes:
-        raise DataError("no episodes: nothing to calibrate with")
-
-    def rank(episode: Episode) -> str:
-        return hashlib.sha256(f"{config.seed}/{episode.name}".encode()).hexdigest()
-
-    count = round(config.held_out_share * len(episodes)) if len(episodes) > 1 else 0
-    chosen = {e.name for e in sorted(episodes, key=rank)[:count]}
-    ordered = sorted(episodes, key=lambda e: (e.name, e.start_ns))
-    return [e for e in ordered if e.name not in chosen], [e for e in ordered if e.name in chosen]

@@ -24,10 +24,11 @@ from compass_ros.cells.series import SignalSpec
 from compass_ros.config import CalibrationConfig, calibration_config
 from compass_ros.episodes import read_episodes
 from compass_ros.operation.current import sources
-from compass_ros.pipeline import calibrate, split
+from compass_ros.pipeline import calibrate
 from compass_ros.posing import launched
 from compass_ros.reporting.result_json import read_result
 from compass_ros.rivals.inverse_dynamics import Log, as_cell, regress, values
+from compass_ros.selection import split
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import recordings
 from compass_ros.simulation.windows import windows

@@ -15,7 +15,7 @@ from compass_ros.cells import load
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery, not_evaluated
 from compass_ros.errors import DataError
-from compass_ros.pipeline import calibrate, evenly, split
+from compass_ros.pipeline import calibrate
 from compass_ros.posing import Posed, launched, noise_floor
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import Replay, recordings
@@ -63,54 +63,11 @@ def found(result: Result) -> list[float]:
     return [row.value for row in result.parameters]
 
 
-def test_the_split_depends_on_names_and_seed_alone() -> None:
-    twelve = named(*(f"shot{i}" for i in range(12)))
-    fit, held_out = split(twelve, CONFIG)
-    assert len(held_out) == 3
-    assert sorted(e.name for e in fit + held_out) == sorted(e.name for e in twelve)
-    for order in (twelve[::-1], [replace(e, source=f"/elsewhere/{e.name}") for e in twelve]):
-        again = split(order, CONFIG)
-        assert [[e.name for e in part] for part in again] == [[e.name for e in part] for part in (fit, held_out)]
-    others = {tuple(e.name for e in split(twelve, replace(CONFIG, seed=seed))[1]) for seed in range(6)}
-    assert len(others) > 3
-
-
-def test_an_episode_more_leaves_most_of_the_held_out_ones_where_they_are() -> None:
-    twelve = named(*(f"shot{i}" for i in range(12)))
-    before = {e.name for e in split(twelve, CONFIG)[1]}
-    after = {e.name for e in split(twelve + named("another"), CONFIG)[1]}
-    assert len(before - after) <= 1
-
-
-def test_of_too_many_episodes_an_even_choice_is_used() -> None:
-    """In the order of recording, whatever the order of names or of the list."""
-    many = named(*(f"shot{i % 7}_{i}" for i in range(1000)))
-    chosen = evenly(many[::-1], 100)
-    at = np.array([e.start_ns - START for e in chosen])
-    assert (at[0], at[-1], len(at)) == (0, 999, 100)
-    assert set(np.diff(at)) == {10, 11}
-    assert evenly(many[:100], 100) == many[:100]
-    assert evenly(many, 1) == many[:1]
-
-
 def test_an_even_choice_is_said(episodes: list[Episode], result: Result) -> None:
     few, _ = calibrate(episodes, cell(), replace(CONFIG, episodes=4))
     assert len(few.fit) + len(few.held_out) == 4
     assert few.warnings[0].startswith("4 of 6 episodes were used")
     assert not any("were used" in said for said in result.warnings)
-
-
-@pytest.mark.parametrize(("share", "count"), [(0.0, 0), (0.25, 2), (0.5, 4)])
-def test_the_share_is_kept(share: float, count: int) -> None:
-    eight = named(*(f"shot{i}" for i in range(8)))
-    assert len(split(eight, replace(CONFIG, held_out_share=share))[1]) == count
-
-
-def test_a_single_episode_is_fitted() -> None:
-    fit, held_out = split(named("only"), CONFIG)
-    assert ([e.name for e in fit], held_out) == (["only"], [])
-    with pytest.raises(DataError, match="no episodes"):
-        split([], CONFIG)
 
 
 def test_what_is_held_out_is_never_fitted(episodes: list[Episode], result: Result) -> None:

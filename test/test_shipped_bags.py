@@ -9,7 +9,8 @@ import pytest
 from compass_ros.cells import load
 from compass_ros.config import calibration_config
 from compass_ros.episodes import read_episodes
-from compass_ros.pipeline import calibrate, split
+from compass_ros.pipeline import calibrate
+from compass_ros.selection import split
 from test.episodes.planted import PUCKS
 
 BAGS = Path(__file__).parents[1] / "bags"

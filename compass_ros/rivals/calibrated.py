@@ -13,8 +13,8 @@ from compass_ros.calibration.problem import Problem
 from compass_ros.cells import Cell
 from compass_ros.config import CalibrationConfig
 from compass_ros.errors import DataError
-from compass_ros.pipeline import split
 from compass_ros.posing import pose
+from compass_ros.selection import split
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import Recordings, recordings
 from compass_ros.types import Episode, Floats, Report, silent

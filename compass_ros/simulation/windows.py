@@ -272,13 +272,18 @@ def _moves(cell: Cell, window: Episode) -> bool:
     """Whether a fitted signal moves by more than its noise: a stretch in which nothing happens is no evidence."""
     for track in window.tracks:
         signal = cell.signal(track.object)
-        least = max(signal.noise or 0.0, (signal.step or 0.0) / math.sqrt(12))
-        if signal.fitted and any(_ranges(values[~np.isnan(values)], least) for values in track.value.T):
+        least = least_motion(signal)
+        if signal.fitted and any(ranges(values[~np.isnan(values)], least) for values in track.value.T):
             return True
     return False
 
 
-def _ranges(values: Floats, least: float) -> bool:
+def least_motion(signal: Signal) -> float:
+    """Standard deviation of a signal's noise as the cell says it, or of its step [unit of the signal]; 0: not said."""
+    return max(signal.noise or 0.0, (signal.step or 0.0) / math.sqrt(12))
+
+
+def ranges(values: Floats, least: float) -> bool:
     """Whether the range of (n,) values is beyond that of noise, whose size shows between neighbours."""
     if len(values) < 3:
         return False
