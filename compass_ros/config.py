@@ -92,7 +92,7 @@ class CalibrationConfig:
     windows: int = Field(
         default=40,
         ge=1,
-        description="most windows of long recordings that are fitted; of more, an even choice over their order",
+        description="most windows of long recordings that are fitted; of more, those that are most unlike each other",
     )
     threads: int = Field(default=0, ge=0, description="threads for rollouts; 0: all cores. Results do not depend on it")
     compass: CompassConfig = Field(default_factory=CompassConfig)

@@ -21,6 +21,7 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.residuals import chi_square, covariance, information_share, typical_residual
 from compass_ros.calibration.screen import WORTH, acting, coupling, independent, many
 from compass_ros.calibration.settle import SETTLED, settled
+from compass_ros.calibration.starts import crossed, draws, lost
 from compass_ros.types import Floats, Ints
 
 SMOOTH = 1.01
@@ -97,11 +98,29 @@ class Refined:
 
 
 def refine(likelihood: Likelihood, values: Floats, watch: Watch = lambda *_: True) -> Refined:
-    """Fit from the given (P,) values."""
-    for stage, (_, fit) in enumerate(growing(likelihood, values), 1):
+    """Fit from the given (P,) values; where their beginning is not explained, from others too."""
+    for stage, (_, fit) in enumerate(begun(likelihood, values), 1):
         if not watch("refine", 0.7 * stage / len(likelihood.horizons), fit.point):
             return polish(likelihood, fit.point, watch)
     return polish(calmed(likelihood, fit.linear), fit.point, watch)
+
+
+def begun(likelihood: Likelihood, values: Floats) -> Iterator[tuple[Likelihood, Fit]]:
+    """`growing` from these values, or from where the beginnings of several starts together lead (`starts`)."""
+    strong = strongest(likelihood, values)
+    stages = growing(likelihood, values, begun=strong)
+    part, fit = next(stages)
+    if not lost(part, fit.point):
+        yield part, fit
+        yield from stages
+        return
+    first, *later = likelihood.horizons
+    few, found = some(likelihood), [fit.point.values]
+    for drawn in draws(likelihood, fit.free, values):
+        found += [one.point.values for _, one in growing(few, drawn, begun=strong, horizons=(first,))]
+    best = crossed(part, found, fit.robust)
+    yield part, replace(fit, point=best)
+    yield from growing(likelihood, best.values, horizons=tuple(later))
 
 
 @dataclass(frozen=True)
