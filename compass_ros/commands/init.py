@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -32,4 +34,15 @@ def init(
         f"{' and '.join(str(file) for file in started.files)}: {len(cell.spec.inputs)} inputs, {len(cell.signals)} "
         f"signals, {len(cell.parameters)} parameters, in {time.monotonic() - begun:.1f} s"
     )
-    typer.echo(f"next: compass calibrate --cell {out} {' '.join(bags)}")
+    typer.echo(f"next: compass calibrate --cell {out} {named(bags)}")
+
+
+def named(bags: Sequence[str]) -> str:
+    """Bags as words of a command; all that one folder holds by its name."""
+    folders = {Path(bag).resolve().parent for bag in bags}
+    own = {Path(bag).resolve() for bag in bags}
+    if len(bags) > 1 and len(folders) == 1:
+        (folder,) = folders
+        if own == {one for one in folder.iterdir() if one.is_dir()}:
+            return os.path.relpath(folder)
+    return " ".join(bags)

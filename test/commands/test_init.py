@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from compass_ros.commands.init import named
 from test.starter.recorded import URDF, moved, record, stamps, state
 
 
@@ -57,3 +58,12 @@ def test_what_is_wrong_is_one_line(tmp_path: Path) -> None:
         assert done.returncode == 1
         assert len(done.stderr.strip().splitlines()) == 1
         assert words[1] in done.stderr
+
+
+def test_the_next_command_names_a_whole_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("one", "two", "three"):
+        (tmp_path / "bags" / name).mkdir(parents=True)
+    assert named(["bags/two/", "bags/one", "bags/three"]) == "bags"
+    assert named(["bags/two/", "bags/one"]) == "bags/two/ bags/one"
+    assert named(["bags"]) == "bags"
