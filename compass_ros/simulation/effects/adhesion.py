@@ -1,7 +1,9 @@
 """Two bodies that stick to each other.
 
-F = force along the normal, towards each other, while two geoms touch, shared by their contacts: to part them takes
-so much more. Source: pull-off force of Derjaguin, Muller and Toporov 1975; applied as MuJoCo's adhesion actuator does.
+F = force (1 - hysteresis c) along the normal, towards each other, while two geoms touch, shared by their contacts; c is
+1 while they come together and 0 while they part: to part them takes more than they attract, and a cycle loses the
+difference. Source: pull-off force of Derjaguin, Muller and Toporov 1975; hysteresis of Chaudhury and Whitesides 1991,
+Langmuir 7, 1013. Applied as MuJoCo's adhesion actuator does, whose hysteresis is 0.
 """
 
 from __future__ import annotations
@@ -19,7 +21,10 @@ def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
 
 def _on_pair(size: PairSize) -> tuple[Quantity, ...]:
     weight = size.mass * size.acceleration
-    return (Quantity("force", "N", 0.0, LARGEST * weight, MODEST * weight),)
+    return (
+        Quantity("force", "N", 0.0, LARGEST * weight, MODEST * weight),
+        Quantity("hysteresis", "1", 0.0, 1.0, 0.1, amplitude=False, later=True, grid=1),
+    )
 
 
 EFFECT = Effect(

@@ -32,13 +32,16 @@ static int contacts_of(const mjData* d, const Term* term) {
   return count;
 }
 
-// A pull along the normal while two geoms touch, shared by their contacts. p: force.
+// A pull along the normal while two geoms touch, shared by their contacts. p: force, hysteresis: the share of it that is
+// missing while they come together. It changes over the speed that gravity gives in a step.
 static void adhesion(const mjModel* m, mjData* d, const Term* term) {
   int count = contacts_of(d, term);
+  double slow = norm3(m->opt.gravity) * m->opt.timestep + 1e-9, v[3];
   for (int i = 0; i < d->ncon; i++) {
     const mjContact* c = d->contact + i;
     if (!acts_on(c, term)) continue;
-    double f = term->number[0] / count;
+    double parting = contact_velocity(m, d, c, v);
+    double f = term->number[0] / count * (1 - term->number[1] * 0.5 * (1 - parting / hypot(parting, slow)));
     mjtNum force[3] = {f * c->frame[0], f * c->frame[1], f * c->frame[2]};   // the normal points to the second geom
     push_apart(m, d, force, c->pos, c->pos, m->geom_bodyid[c->geom[0]], m->geom_bodyid[c->geom[1]]);
   }

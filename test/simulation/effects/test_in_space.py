@@ -220,6 +220,28 @@ def test_to_lift_what_sticks_takes_its_weight_and_the_adhesion(
     assert bool(data.qpos[2] < 0.101) is stays
 
 
+@pytest.mark.parametrize("hysteresis", [0.0, 0.5, 1.0])
+def test_a_bounce_loses_what_is_missing_of_the_adhesion_while_surfaces_meet(hysteresis: float) -> None:
+    """No gravity and a contact without losses: m (v^2 - v'^2) / 2 = hysteresis F (1 - i) d, at a depth of d.
+
+    Of what else acts at a contact of impedance i MuJoCo's constraint leaves the share 1 - i: half.
+    """
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><option timestep="2e-5" gravity="0 0 0"/><worldbody><geom name="floor" type="plane" size="9 9 1" '
+        'solref="-4000 0" solimp=".5 .5 1e-4"/><body name="it" pos="0 0 .1005"><freejoint/><geom name="it" '
+        'size=".1" mass=".5" solref="-4000 0" solimp=".5 .5 1e-4"/></body></worldbody></mujoco>'
+    )
+    data, force = mujoco.MjData(model), 4.0
+    data.qvel[2], deepest = -0.5, 0.0
+    with attach(model, data, law("adhesion", (force, hysteresis), "it", "floor")):
+        for _ in range(5000):
+            mujoco.mj_step(model, data)
+            deepest = max(deepest, 0.1 - data.qpos[2])
+    assert data.qpos[2] > 0.1005
+    lost = 0.5 * 0.5 * (0.5**2 - data.qvel[2] ** 2)
+    assert lost == pytest.approx(hysteresis * force * 0.5 * deepest, rel=0.03, abs=2e-4)
+
+
 @pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
 @pytest.mark.parametrize("lever", [0.0, 1e-3, 4e-3, 1e-2, 2e-2])
 def test_a_rolling_ball_slows_down_by_the_closed_formula(cone: str, lever: float) -> None:
