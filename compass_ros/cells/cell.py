@@ -31,6 +31,11 @@ class Cell:
         return self.spec.name
 
     @property
+    def hashes(self) -> tuple[str, ...]:
+        """Configurations whose recordings are this cell's: its own first."""
+        return self.hash, *self.spec.recorded_as
+
+    @property
     def model_path(self) -> Path:
         return self.path.parent / self.spec.model
 

@@ -113,6 +113,9 @@ class CellSpec:
     """When the motion begins, where that differs from episode to episode."""
     auto: bool = False
     """Every other tunable field of the scene becomes a parameter too."""
+    recorded_as: tuple[str, ...] = ()
+    """Other configurations (the hashes in their bags) whose recordings are this cell's too: the same topics and sensors
+    were told in another file, or in this one before it was changed."""
     causal: tuple[Name, ...] = ()
     """Parameters that the paper found to be causes; used by benchmarks only."""
 

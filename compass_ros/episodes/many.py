@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from compass_ros.episodes.reader import find_bags, read_episode
+from compass_ros.episodes.reader import Hashes, find_bags, read_episode
 from compass_ros.episodes.sources import Source
 from compass_ros.errors import BagError, CompassError
 from compass_ros.types import Episode, LeftOut
@@ -51,7 +51,7 @@ def read_each(
     paths: Iterable[str | Path],
     sources: Sequence[Source],
     cell: str = "",
-    cell_hash: str = "",
+    cell_hash: Hashes = "",
     use: Callable[[Episode], object] = lambda episode: episode,
 ) -> Reading:
     """As `read_episodes`, without the bags that cannot be read, or of which `use` raises a CompassError.

@@ -31,6 +31,8 @@ from compass_ros.episodes.tracks import tracks
 from compass_ros.errors import BagError, nearest
 from compass_ros.types import Episode, Track
 
+Hashes = str | tuple[str, ...]
+"""Of the configuration in which a bag was recorded: of the cell itself, then of others whose bags are its own too."""
 Streams = dict[Source, dict[Stream, Rows]]
 
 EARLY_SHOT_NS = 10**9
@@ -88,26 +90,26 @@ def _bags_in(folder: Path) -> list[Path]:
 
 
 def read_episodes(
-    paths: Iterable[str | Path], sources: Sequence[Source], cell: str = "", cell_hash: str = ""
+    paths: Iterable[str | Path], sources: Sequence[Source], cell: str = "", cell_hash: Hashes = ""
 ) -> tuple[Episode, ...]:
     """Read bags (or folders of bags) given in any order; sorted by name, then start. Raises BagError."""
     episodes = [read_episode(path, sources, cell, cell_hash) for path in find_bags(paths)]
     return tuple(sorted(episodes, key=lambda episode: (episode.name, episode.start_ns, episode.source)))
 
 
-def read_episode(path: str | Path, sources: Sequence[Source], cell: str = "", cell_hash: str = "") -> Episode:
+def read_episode(path: str | Path, sources: Sequence[Source], cell: str = "", cell_hash: Hashes = "") -> Episode:
     """Read one bag. Shorthand for `read_bag(...).episode`."""
     return read_bag(path, sources, cell, cell_hash).episode
 
 
-def read_bag(path: str | Path, sources: Sequence[Source], cell: str = "", cell_hash: str = "") -> BagContent:
+def read_bag(path: str | Path, sources: Sequence[Source], cell: str = "", cell_hash: Hashes = "") -> BagContent:
     """Read one bag.
 
     Args:
         path: A bag's folder or file.
         sources: Where the tracks come from, one each; each must have messages.
-        cell, cell_hash: What the bag must have been recorded in; empty: anything. A bag that does not say (a foreign
-            one) passes and gets the name `cell` and an empty hash.
+        cell, cell_hash: What the bag must have been recorded in (any of several hashes); empty: anything. A bag that
+            does not say (a foreign one) passes and gets the name `cell` and an empty hash.
 
     Raises:
         BagError: The bag is missing, empty, truncated, foreign, of another cell, without a wanted topic, with more than
@@ -199,13 +201,17 @@ class _Content:
         self.shots.clear()
 
 
-def _episode(path: Path, content: _Content, cell: str, cell_hash: str) -> Episode:
+def _episode(path: Path, content: _Content, cell: str, cell_hash: Hashes) -> Episode:
     streams = content.streams()
     head = content.headers[0] if content.headers else EpisodeHeader("finished", bag_name(path))
     if cell and head.cell and head.cell != cell:
         raise BagError(f"recorded in another cell: expected '{cell}', found '{head.cell}'")
-    if cell_hash and head.cell_hash and head.cell_hash != cell_hash:
-        raise BagError(f"recorded in another '{cell}': expected configuration {cell_hash}, found {head.cell_hash}")
+    known = (cell_hash,) if isinstance(cell_hash, str) else cell_hash
+    if known[0] and head.cell_hash and head.cell_hash not in known:
+        raise BagError(
+            f"recorded in another '{cell}': expected configuration {known[0]}, found {head.cell_hash}; where topics "
+            f"and sensors are the same, say `recorded_as: ['{head.cell_hash}']` in the cell"
+        )
     rows = {source: streams.get(source) or content.latched.get(source, {}) for source in content.sources}
     aligned, clocks = on_one_clock(rows)
     found = {source: _tracks(source, aligned[source], content) for source in content.sources}

@@ -135,7 +135,7 @@ def sources(cell: Cell) -> list[Source]:
 
 def read(cell: Cell, bag: Path | str) -> Episode:
     """One episode of the cell. Raises BagError."""
-    return read_episode(bag, sources(cell), cell.name, cell.hash)
+    return read_episode(bag, sources(cell), cell.name, cell.hashes)
 
 
 def read_usable(cell: Cell, paths: Iterable[Path | str]) -> Reading:
@@ -147,7 +147,7 @@ def read_usable(cell: Cell, paths: Iterable[Path | str]) -> Reading:
     def compare(episode: Episode) -> object:
         return recordings(cell, windows(cell, [episode]))
 
-    return read_each(paths, sources(cell), cell.name, cell.hash, compare)
+    return read_each(paths, sources(cell), cell.name, cell.hashes, compare)
 
 
 def held_out_bags(bags: Sequence[str], names: Sequence[str]) -> tuple[Path, ...]:

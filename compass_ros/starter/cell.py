@@ -83,7 +83,11 @@ def _head(out: Path, scene: Path, model: Path, recordings: Recordings, remarks: 
     for remark in remarks:
         lines += comment(f"Note: {remark}")
     relative = os.path.relpath(scene, out.parent)
-    return [*lines, f"name: {plain(recordings.cell or out.stem)}", "dynamics: mjcf", f"model: {plain(relative)}"]
+    lines += [f"name: {plain(recordings.cell or out.stem)}", "dynamics: mjcf", f"model: {plain(relative)}"]
+    if recordings.cell_hash:
+        lines += comment("These recordings name the configuration in which they were made.")
+        lines.append(f"recorded_as: {listed([recordings.cell_hash])}")
+    return lines
 
 
 def _series(found: Found, used: Robot, recordings: Recordings) -> Iterator[str]:

@@ -71,6 +71,7 @@ class Recordings:
     notes: tuple[str, ...]
     """What could not be read, and why."""
     cell: str = ""
+    cell_hash: str = ""
     """Whose recordings the first of them says that they are; empty where it says nothing."""
 
 
@@ -90,7 +91,8 @@ def read_all(paths: Iterable[str | Path]) -> Recordings:
         notes += said
     whole = tuple(Series(held, tuple(tracks)) for held, tracks in found.items() if len(tracks) == len(bags))
     seconds = tuple(_seconds(whole, i) for i in range(len(bags)))
-    return Recordings(tuple(bags), len(every), whole, seconds, tuple(notes), read_bag(bags[0], ()).episode.cell)
+    first = read_bag(bags[0], ()).episode
+    return Recordings(tuple(bags), len(every), whole, seconds, tuple(notes), first.cell, first.cell_hash)
 
 
 def _in_all(surveys: Sequence[Sequence[Held]]) -> tuple[list[Held], list[str]]:

@@ -134,6 +134,8 @@ def test_foreign(tmp_path: Path) -> None:
 def test_of_another_cell(bag: Path) -> None:
     assert "expected 'push_i', found 'air_hockey'" in complaint(bag, cell="push_i")
     assert "expected configuration ffff, found a1b2" in complaint(bag, cell="air_hockey", cell_hash="ffff")
+    assert "say `recorded_as: ['a1b2']` in the cell" in complaint(bag, cell="air_hockey", cell_hash="ffff")
+    assert read_episode(bag, PUCKS, "air_hockey", ("ffff", "a1b2")).cell_hash == "a1b2"
 
 
 def test_topic_of_another_type(bag: Path) -> None:

@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from compass_ros.bench.driven import Routine
+from compass_ros.bench.driven import record as record_driven
 from compass_ros.cells import Cell, load
 from compass_ros.cells.registry import dynamics_of
-from compass_ros.episodes import Source, read_episodes
+from compass_ros.episodes import Source, read_episodes, write_episode
 from compass_ros.errors import ConfigError
-from compass_ros.operation.current import sources
+from compass_ros.operation.current import read, sources
 from compass_ros.simulation.windows import windows
 from compass_ros.starter.cell import start
 from compass_ros.types import Floats, Track
@@ -193,3 +195,18 @@ def test_nothing_in_common_is_one_line(tmp_path: Path) -> None:
     assert "patch, shoulder" in said
     assert "did you mean 'pitch'?" in said
     assert "\n" not in said
+
+
+def test_recordings_of_another_configuration_are_read_by_the_cell_that_was_begun_with_them(tmp_path: Path) -> None:
+    """Their bags name the cell and the hash of its file; the new file has another hash, before and after an edit."""
+    theirs, bags, out = load("two_joint_arm_driven"), tmp_path / "bags", tmp_path / "own.yaml"
+    for episode in record_driven(theirs, theirs.defaults, 2, Routine(seconds=3.0), 0):
+        write_episode(episode, bags, sources(theirs))
+    start(theirs.model_path, [str(bags)], out, links=False)
+    for _ in range(2):
+        own = load(out)
+        assert own.name == theirs.name
+        assert own.hash != theirs.hash
+        assert own.hashes == (own.hash, theirs.hash)
+        assert {read(own, bag).cell_hash for bag in sorted(bags.iterdir())} == {theirs.hash}
+        out.write_text(out.read_text() + "# edited\n")
