@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -44,5 +43,5 @@ def named(bags: Sequence[str]) -> str:
     if len(bags) > 1 and len(folders) == 1:
         (folder,) = folders
         if own == {one for one in folder.iterdir() if one.is_dir()}:
-            return os.path.relpath(folder)
+            return str(Path(bags[0]).parent)
     return " ".join(bags)
