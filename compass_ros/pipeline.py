@@ -55,8 +55,8 @@ def calibrate(
         return replace(one, warnings=(*told, *checked.said, *one.warnings), left_out=left_out)
 
     fit, held_out = split(used, config)
-    fitted = unlike(cell, windows(cell, fit), config.windows) if cell.spec.windows else evenly(fit, config.episodes)
-    data = recordings(cell, fitted)
+    cut = windows(cell, fit)
+    data = recordings(cell, unlike(cell, cut, config.windows) if cell.spec.windows else evenly(cut, config.episodes))
     judge = recordings(cell, evenly(windows(cell, held_out or fit), config.episodes)).numbered(len(data.names))
     simulator = simulator.driven(data.drives + judge.drives)
     noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)

@@ -99,20 +99,20 @@ class Refined:
 
 def refine(likelihood: Likelihood, values: Floats, watch: Watch = lambda *_: True) -> Refined:
     """Fit from the given (P,) values; where their beginning is not explained, from others too."""
-    for stage, (_, fit) in enumerate(begun(likelihood, values), 1):
+    for stage, (_, fit) in enumerate(stages(likelihood, values), 1):
         if not watch("refine", 0.7 * stage / len(likelihood.horizons), fit.point):
             return polish(likelihood, fit.point, watch)
     return polish(calmed(likelihood, fit.linear), fit.point, watch)
 
 
-def begun(likelihood: Likelihood, values: Floats) -> Iterator[tuple[Likelihood, Fit]]:
+def stages(likelihood: Likelihood, values: Floats) -> Iterator[tuple[Likelihood, Fit]]:
     """`growing` from these values, or from where the beginnings of several starts together lead (`starts`)."""
     strong = strongest(likelihood, values)
-    stages = growing(likelihood, values, begun=strong)
-    part, fit = next(stages)
+    alone = growing(likelihood, values, begun=strong)
+    part, fit = next(alone)
     if not lost(part, fit.point):
         yield part, fit
-        yield from stages
+        yield from alone
         return
     first, *later = likelihood.horizons
     few, found = some(likelihood), [fit.point.values]

@@ -10,7 +10,7 @@ import pytest
 
 from compass_ros.calibration.cost import ROBUST, cost, start
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import begun, growing, refine
+from compass_ros.calibration.refine import growing, refine, stages
 from compass_ros.calibration.starts import crossed, draws, lost, parts
 from compass_ros.types import Floats
 from test.calibration.toys import likelihood
@@ -51,7 +51,7 @@ def test_no_start_alone_is_right_for_all_objects() -> None:
 def test_a_fit_that_explains_the_beginning_is_left_alone() -> None:
     given = objects()
     near = np.array(TRUTH) + 0.05
-    plain, begins = list(growing(given, near)), list(begun(given, near))
+    plain, begins = list(growing(given, near)), list(stages(given, near))
     assert len(plain) == len(begins)
     for (_, one), (_, other) in zip(plain, begins, strict=True):
         np.testing.assert_array_equal(one.point.values, other.point.values)
@@ -59,7 +59,7 @@ def test_a_fit_that_explains_the_beginning_is_left_alone() -> None:
 
 def test_a_shot_begins_simply_and_is_not_sought_elsewhere() -> None:
     given = replace(objects(), windowed=False)
-    (_, plain), (_, first) = (next(stages(given, np.zeros(6))) for stages in (growing, begun))
+    (_, plain), (_, first) = (next(fits(given, np.zeros(6))) for fits in (growing, stages))
     np.testing.assert_array_equal(plain.point.values, first.point.values)
 
 
