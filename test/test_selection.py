@@ -112,7 +112,7 @@ def test_the_choice_is_within_twice_the_best(arm: Cell) -> None:
 
 def test_a_joint_that_is_still_has_no_say(arm: Cell) -> None:
     """Its noise is as far apart as the motion of the other, in shares of its range."""
-    still = [window(arm, i, np.array([1.0, 0.0]) * (1 + i % 5)) for i in range(40)]
+    still = [window(arm, i, np.array([1.0 + i % 5, 0.0])) for i in range(40)]
     held = traits(arm, still).reshape(40, -1, 3, 2)
     assert not held[:, 0, :, 1].any()
     assert held[:, 0, :, 0].any()
