@@ -20,6 +20,7 @@ JOINS = {
     "estimation": 3,
     "results": 3,
     "operation": 3,
+    "selection": 3,
     "planning": 4,
     "targets": 4,
     "concealed": 3,
