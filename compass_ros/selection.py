@@ -54,23 +54,22 @@ def traits(cell: Cell, windows: Sequence[Episode]) -> Floats:
 
     A number that is still in all windows is left out: its ranges would be those of its noise.
     """
-    names = dict.fromkeys(track.object for window in windows for track in _series(window))
-    return np.concatenate([_of_series(cell, windows, name) for name in names], axis=1)
+    held = [{track.object: _within(track, window) for track in (*window.tracks, *window.inputs)} for window in windows]
+    noise = {signal.name: least_motion(signal) for signal in cell.signals}
+    names = dict.fromkeys(name for series in held for name in series)
+    return np.concatenate([_of_series([s.get(name) for s in held], noise.get(name, 0.0)) for name in names], axis=1)
 
 
-def _of_series(cell: Cell, windows: Sequence[Episode], name: str) -> Floats:
-    """(W, 3 D) of one signal or input; a window without it is as the mean of the others."""
-    least = least_motion(cell.signal(name)) if name in {s.name for s in cell.signals} else 0.0
-    parts = [_within(track, window) for window in windows for track in _series(window) if track.object == name]
-    width = next(value.shape[1] for _, value in parts)
-    moves = [ranges(_seen(np.concatenate([value[:, i] for _, value in parts])), least) for i in range(width)]
-    out = np.full((len(windows), 3, width), np.nan)
-    for row, window in enumerate(windows):
-        for track in (track for track in _series(window) if track.object == name):
-            time_s, value = _within(track, window)
-            for column in np.flatnonzero(moves):
-                out[row, :, column] = _traits(time_s, value[:, column], least)
-    flat = out.reshape(len(windows), -1)
+def _of_series(held: Sequence[tuple[Floats, Floats] | None], least: float) -> Floats:
+    """(W, 3 D) of one signal or input in each window; one without it is as the mean of the others."""
+    values = np.concatenate([found[1] for found in held if found])
+    moving = [i for i, column in enumerate(values.T) if ranges(column[np.isfinite(column)], least)]
+    out = np.full((len(held), 3, values.shape[1]), np.nan)
+    for row, found in ((row, found) for row, found in enumerate(held) if found):
+        time_s, value = found
+        for column in moving:
+            out[row, :, column] = _traits(time_s, value[:, column], least)
+    flat = out.reshape(len(held), -1)
     seen = np.isfinite(flat)
     mean = np.where(seen, flat, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
     flat = np.where(seen, flat, mean)
@@ -88,14 +87,6 @@ def _traits(time_s: Floats, values: Floats, least: float) -> tuple[float, float,
         return mean, 0.0, 0.0
     rate = np.diff(values[seen]) / np.maximum(np.diff(time_s[seen]), _NS)
     return mean, float(np.sqrt(np.mean(rate**2))), float(np.max(np.abs(rate)))
-
-
-def _series(window: Episode) -> tuple[Track, ...]:
-    return (*window.tracks, *window.inputs)
-
-
-def _seen(values: Floats) -> Floats:
-    return np.asarray(values[np.isfinite(values)])
 
 
 def _within(track: Track, window: Episode) -> tuple[Floats, Floats]:

@@ -114,13 +114,13 @@ def stages(likelihood: Likelihood, values: Floats) -> Iterator[tuple[Likelihood,
         yield part, fit
         yield from alone
         return
-    first, *later = likelihood.horizons
     few, found = some(likelihood), [fit.point.values]
     for drawn in draws(likelihood, fit.free, values):
-        found += [one.point.values for _, one in growing(few, drawn, begun=strong, horizons=(first,))]
+        _, other = next(growing(few, drawn, begun=strong))
+        found.append(other.point.values)
     best = crossed(part, found, fit.robust)
     yield part, replace(fit, point=best)
-    yield from growing(likelihood, best.values, horizons=tuple(later))
+    yield from growing(likelihood, best.values, horizons=likelihood.horizons[1:])
 
 
 @dataclass(frozen=True)
