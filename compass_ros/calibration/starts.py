@@ -22,8 +22,7 @@ from compass_ros.calibration.residuals import typical_residual
 from compass_ros.types import Floats, Ints
 
 OTHERS = 15
-"""Other starts. The beginnings of SO-101's windows end at 534 thousand nats from the defaults alone, at 499 with 1 or 2
-others, at 458 with 4; of its five joints one is right with none, four are with 15 (docs/arms.md). A budget."""
+"""Other starts: a budget. With none SO-101's first joint is held out at 15 mrad, with 15 at 4.8 (docs/arms.md)."""
 
 
 def lost(likelihood: Likelihood, point: Point) -> bool:
