@@ -20,6 +20,8 @@ _OTHERS = (0.01, 100.0)
 _AS_HOPED, _EASIER = 0.9, 0.1
 """Share of the hoped fall of the cost from which a step is as good as any, and factor of the damping after such a one;
 where the linear model holds, damping only shortens the step."""
+LONGER = (2.0, 4.0, 8.0, 16.0)
+"""Factors by which a step is stretched that gained more than was hoped for: a budget."""
 
 
 NONE: Ints = np.zeros(0, dtype=np.int64)
@@ -94,7 +96,8 @@ def minimise(
 
     Differences are taken anew only where the model failed to predict what a step did; otherwise Broyden's update keeps
     it going, which costs no rollout. `linear`: differences that are known already near the point. `fresh`: end with
-    differences at the solution, as standard errors need them. `steps`: (p,) of the first differences, where known.
+    differences that were taken at the solution, or a step below `tolerance` before it, as standard errors need them.
+    `steps`: (p,) of the first differences, where known.
     `onset`: (E, p) where it is known at a point nearby and `linear` is not.
     """
     damping = 1e-3
@@ -122,7 +125,7 @@ def minimise(
             converged = exact and gained < tolerance
             keep = converged or (gained > 0.5 * step.hoped and gained > tolerance)
             linear = broyden(linear, step.residual, step.move) if keep else None
-            exact = False
+            exact = converged
         elif exact:
             damping *= 1e3
             converged = damping > 1e6
@@ -156,8 +159,28 @@ def tried(
     dampings: Sequence[float],
 ) -> list[Step]:
     """A step with each damping, all rolled out in one batch; `normal` equations at the point."""
+    trials = [damped_step(likelihood, point, free, *normal, damping) for damping in dampings]
+    return _judged(likelihood, point, free, normal, robust, trials, dampings)
+
+
+def stretched(
+    likelihood: Likelihood, point: Point, free: Ints, normal: tuple[Floats, Floats], robust: float, step: Step
+) -> list[Step]:
+    """The same step so many times as long, where it gained more than it should: the valley is flatter than it looks."""
+    trials = [moved(likelihood, point, free, factor * step.move) for factor in LONGER]
+    return _judged(likelihood, point, free, normal, robust, trials, [step.damping] * len(LONGER))
+
+
+def _judged(
+    likelihood: Likelihood,
+    point: Point,
+    free: Ints,
+    normal: tuple[Floats, Floats],
+    robust: float,
+    trials: list[Point],
+    dampings: Sequence[float],
+) -> list[Step]:
     hessian, gradient = normal
-    trials = [damped_step(likelihood, point, free, hessian, gradient, damping) for damping in dampings]
     found = []
     for trial, c, residual, damping in zip(trials, *cost(likelihood, trials, robust), dampings, strict=True):
         move = move_between(likelihood, point, trial, free)

@@ -70,6 +70,8 @@ class Likelihood:
     difference: Difference = plain_difference
     windowed: bool = False
     """Whether these are windows of long recordings, each with a first state of its own."""
+    smooth: bool = False
+    """Whether the simulator is known to have no roughness here: differences of one length are as good as of another."""
 
     @property
     def low(self) -> Floats:

@@ -181,8 +181,7 @@ def polish(likelihood: Likelihood, point: Point, watch: Watch = lambda *_: True)
     watch("refine", 0.85, fit.point)
     rough = with_roughness(likelihood, fit)
     linear = scaled(fit.linear, likelihood, rough)
-    smooth = likelihood.windowed and bool(np.max(rough.sigma / likelihood.sigma) < SMOOTH)
-    fit = settled(rough, replace(fit, linear=linear, robust=ROBUST), rounds=1 if smooth else 2)
+    fit = settled(rough, replace(fit, linear=linear, robust=ROBUST))
     point = relaunched(rough, fit)
     if point.cost < fit.point.cost - SETTLED:
         fit = settled(rough, replace(fit, point=point))
@@ -286,7 +285,8 @@ def with_roughness(likelihood: Likelihood, fit: Fit, draws: int = 6) -> Likeliho
     beyond -= np.einsum("efcp,np->nefc", fit.linear.jacobian, moves)
     spread = np.sqrt(np.mean(beyond**2, axis=0)) * likelihood.sigma
     grown = np.maximum.accumulate(spread, axis=1)  # roughness never heals
-    return replace(likelihood, sigma=np.hypot(likelihood.sigma, grown))
+    sigma = np.hypot(likelihood.sigma, grown)
+    return replace(likelihood, sigma=sigma, smooth=bool(np.max(sigma / likelihood.sigma) < SMOOTH))
 
 
 def standard_errors(refined: Refined) -> tuple[Ints, Floats]:

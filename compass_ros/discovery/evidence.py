@@ -28,6 +28,8 @@ from compass_ros.types import Floats
 ROUNDS = 2
 """How often weights are taken anew, as long as the bound rises by SLIGHT: a tenth of what odds are read to."""
 SLIGHT = 0.1
+PIECES = 24
+"""Into which an episode is cut for its products: about as many as pushes have moments."""
 ROUNDING = 1e-12
 """Share of a column that sums over ten thousand rows in double precision leave open."""
 
@@ -85,11 +87,7 @@ class Normal:
     def of(tangent: Tangent, residual: Floats) -> Normal:
         """With weights taken at (E, D) residuals."""
         weight = robust_weight(residual, tangent.robust)
-        columns = np.concatenate(
-            [tangent.parameters, tangent.own, tangent.pushes, tangent.residual[:, :, None]], axis=2
-        )
-        weighted = columns * weight[:, :, None]
-        gram = np.stack([a.T @ b for a, b in zip(weighted, columns, strict=True)])
+        gram = _gram((tangent.parameters, tangent.own, tangent.pushes, tangent.residual[:, :, None]), np.sqrt(weight))
         constant = float(np.sum(robust_loss(residual, tangent.robust) - weight * residual**2))
         return Normal(gram / tangent.correlation_time, constant / tangent.correlation_time)
 
@@ -98,6 +96,23 @@ class Normal:
         factor = np.ones(self.gram.shape[1])
         factor[: len(stds)] = stds
         return Normal(self.gram * factor[:, None] * factor, self.constant)
+
+
+def _gram(parts: Sequence[Floats], root: Floats) -> Floats:
+    """(E, n, n) products of all columns of (E, D, n_i) parts, weighted by the squares of (E, D) roots.
+
+    A push does nothing before its moment, and an error of a signal only near its own: of each piece of an episode only
+    the columns that are not zero there are multiplied.
+    """
+    size = sum(part.shape[2] for part in parts)
+    out = np.zeros((len(root), size, size))
+    for e, weights in enumerate(root):
+        for rows in np.array_split(np.arange(len(weights)), PIECES):
+            columns = np.concatenate([part[e, rows] for part in parts], axis=1)
+            on = np.flatnonzero(columns.any(axis=0))
+            columns = columns[:, on] * weights[rows, None]
+            out[e][np.ix_(on, on)] += columns.T @ columns
+    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,17 +141,22 @@ class Factored:
         episodes, p, own_numbers = len(gram), tangent.parameters.shape[2], tangent.own.shape[2]
         pushes = tangent.pushes.shape[2]
         mixed = np.zeros((pushes, 0)) if spread is None else spread
+        acting = np.flatnonzero(mixed.any(axis=tuple(i for i in range(mixed.ndim) if i != mixed.ndim - 2)))
+        mixed = mixed[..., acting, :]
         self._mixed = np.broadcast_to(mixed, (episodes, *mixed.shape[-2:]))
         self._turned = self._mixed.transpose(0, 2, 1)
         first = p + own_numbers
-        self._own, self._pushes = slice(p, first), slice(first, first + pushes)
+        self._own, self._pushes = slice(p, first), first + acting
+        self._acting, self._all = acting, pushes
         self._p, self._l, self._tangent, self._constant = p, own_numbers, tangent, normal.constant
         own, hats, q = self._own, self._pushes, self._mixed.shape[2]
         inner = np.empty((episodes, own_numbers + q, own_numbers + q))
         inner[:, :own_numbers, :own_numbers] = gram[:, own, own]
-        inner[:, :own_numbers, own_numbers:] = gram[:, own, hats] @ self._mixed
+        inner[:, :own_numbers, own_numbers:] = np.ascontiguousarray(gram[:, own][:, :, hats]) @ self._mixed
         inner[:, own_numbers:, :own_numbers] = inner[:, :own_numbers, own_numbers:].transpose(0, 2, 1)
-        inner[:, own_numbers:, own_numbers:] = self._turned @ gram[:, hats, hats] @ self._mixed
+        inner[:, own_numbers:, own_numbers:] = (
+            self._turned @ np.ascontiguousarray(gram[:, hats][:, :, hats]) @ self._mixed
+        )
         self._factor = _root(inner + np.eye(own_numbers + q))
         across = np.concatenate([gram[:, own, :p], self._turned @ gram[:, hats, :p]], axis=1)
         self._half = np.linalg.solve(self._factor, across)
@@ -168,8 +188,9 @@ class Factored:
         last = normal.gram[:, :-1, -1:]
         logs, step, half = self._steps(last, normal.gram[:, -1, -1].sum(keepdims=True))
         within = -np.linalg.solve(self._factor.transpose(0, 2, 1), self._half @ step + half)
-        push = self._mixed @ within[:, self._l :]
-        return Solved(float(logs[0]), step[:, 0], within[:, : self._l, 0], push[..., 0], self.precision)
+        push = np.zeros((len(within), self._all))
+        push[:, self._acting] = (self._mixed @ within[:, self._l :])[..., 0]
+        return Solved(float(logs[0]), step[:, 0], within[:, : self._l, 0], push, self.precision)
 
 
 def _root(matrix: Floats) -> Floats:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compass_ros.calibration.cost import Point, cost, robust_loss
-from compass_ros.calibration.differences import difference_steps, extended
+from compass_ros.calibration.differences import Linear, difference_steps, extended
 from compass_ros.calibration.least_squares import Fit, minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import Strongest, growing, strongest
@@ -44,10 +44,12 @@ class Begun:
 
     laws: tuple[Attached, ...]
     """The law, on each of its sites."""
-    values: Floats
-    """(P + q,)"""
-    cost: float
-    """Half the robust sum of squares of these episodes plus half the prior's."""
+    point: Point
+    """Of these episodes: their launches, and half their robust sum of squares plus half the prior's."""
+    linear: Linear | None = None
+    """Differences near it, where these are all episodes."""
+    bent: bool = True
+    """Whether it began at its parent's fit, near which its parent's differences hold."""
 
 
 def telling(parent: Hypothesis) -> Ints:
@@ -86,7 +88,8 @@ def from_parent(parent: Hypothesis, ranked: Ranked, rows: Ints, iterations: int)
     everything = np.concatenate([tuned, len(base.values) + np.arange(len(amplitude))])
     linear = extended(parent.fit.linear.of(rows), likelihood, starts[best], residuals[best], everything)
     fit = minimise(likelihood, starts[best], everything, iterations, parent.fit.robust, 1.0, linear, fresh=False)
-    return Begun(laws, fit.point.values, fit.point.cost)
+    everywhere = len(rows) == len(parent.likelihood.inputs)
+    return Begun(laws, fit.point, fit.linear if everywhere else None)
 
 
 def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:
@@ -127,7 +130,7 @@ def _at_the_end(parent: Hypothesis, laws: tuple[Attached, ...], likelihood: Like
     free, steps = _with_law(parent, fit.point.values)
     robust = max(parent.fit.robust, 3.0 * typical_residual(likelihood, fit.point))
     point = minimise(likelihood, fit.point, free, FEW, robust, 3.0, steps=steps, fresh=False).point
-    return Begun(laws, point.values, float(cost(likelihood, [point], parent.fit.robust)[0][0]))
+    return Begun(laws, replace(point, cost=float(cost(likelihood, [point], parent.fit.robust)[0][0])), bent=False)
 
 
 def _with_law(parent: Hypothesis, values: Floats) -> tuple[Ints, Floats]:
@@ -177,14 +180,23 @@ def _runner(
 
 
 def whole(parent: Hypothesis, begun: Begun) -> Hypothesis:
-    """A model fitted to all episodes, with exact differences at the end."""
+    """A model fitted to all episodes, with exact differences at the end.
+
+    One that began at its parent's fit goes on with the differences there as long as they hold.
+    """
     simulator, likelihood = widened(parent.simulator, parent.likelihood, begun.laws)
-    free, steps = _with_law(parent, begun.values)
-    point = Point(begun.values, parent.fit.point.launch, np.inf)
+    free, steps = _with_law(parent, begun.point.values)
+    point, linear = begun.point, begun.linear
+    if linear is None:
+        point = Point(point.values, parent.fit.point.launch, np.inf)
+        if begun.bent:
+            (residual,) = cost(likelihood, [point], parent.fit.robust)[1]
+            linear = extended(parent.fit.linear, likelihood, point, residual, free)
     robust = 3.0 * typical_residual(likelihood, point)
     if robust > parent.fit.robust:  # what these episodes did not hold is far off
-        point = minimise(likelihood, point, free, FEW, robust, 3.0, steps=steps, fresh=False).point
-    fit = minimise(likelihood, point, free, FEW, parent.fit.robust, _SLIGHT, steps=steps)
+        point = minimise(likelihood, point, free, FEW, robust, 3.0, linear, fresh=False, steps=steps).point
+        linear = None
+    fit = minimise(likelihood, point, free, FEW, parent.fit.robust, _SLIGHT, linear, steps=steps)
     return Hypothesis((*parent.laws, *begun.laws), simulator, likelihood, fit, without=parent.bare)
 
 
@@ -210,6 +222,8 @@ def without(model: Hypothesis, laws: Sequence[Attached]) -> Hypothesis:
         prior_std=of_all.prior_std[at],
     )
     point = replace(model.fit.point, values=model.fit.point.values[at], cost=np.inf)
-    free = np.flatnonzero(np.isin(at, model.fit.free))
-    fit = minimise(likelihood, point, free, FEW, model.fit.robust, _SLIGHT)
+    free, linear = np.flatnonzero(np.isin(at, model.fit.free)), model.fit.linear
+    left = np.isin(model.fit.free, at)
+    linear = replace(linear, jacobian=linear.jacobian[..., left], onset=linear.onset[:, left])
+    fit = minimise(likelihood, point, free, FEW, model.fit.robust, _SLIGHT, linear)
     return Hypothesis(tuple(kept), simulator, likelihood, fit, without=model.bare)

@@ -62,11 +62,12 @@ def widen(known: Known, best: Hypothesis, ranked: Sequence[Ranked], called: bool
     known.take(whole(best, one) for one in probable(begun, known.prior))
 
 
-def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str], called: bool) -> None:
+def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str], called: bool, least: float) -> None:
     """Fit models with another law in the place of one of the best model's, until none is better.
 
     The first law that was taken stood for all that differs; beside the second one another may stand for the rest.
     `widened`: names of models whose neighbours were fitted; those of this search are added. `called`: as in `widen`.
+    `least`: log odds up to which, to first order, a model is not worth a fit.
     """
     leader = None
     while known.ordered and known.ordered[0][0] is not leader:
@@ -83,7 +84,8 @@ def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str], c
                 continue  # another of its laws is zero without this one
             less, of_less = known.models[rest]
             ranked = rank(FirstOrder(less.response), candidates)
-            better = [r for r in ranked if of_less + r.gain + known.prior.of_laws([r.candidate.name]) > odds]
+            worth = max(odds, least)
+            better = [r for r in ranked if of_less + r.gain + known.prior.of_laws([r.candidate.name]) > worth]
             widen(known, less, better, called)
 
 
@@ -101,7 +103,7 @@ def probable(begun: Sequence[Begun], prior: Prior) -> list[Begun]:
     """
     best: dict[frozenset[tuple[str, tuple[str, ...]]], tuple[float, Begun]] = {}
     for one in begun:
-        odds = prior.of_laws(a.effect.name for a in one.laws) - one.cost
+        odds = prior.of_laws(a.effect.name for a in one.laws) - one.point.cost
         sites = frozenset((a.effect.name, a.objects) for a in one.laws)
         if sites not in best or odds > best[sites][0]:
             best[sites] = odds, one

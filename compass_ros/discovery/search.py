@@ -60,11 +60,11 @@ def search(
         return found
     known = Known(prior, none, {}, set())
     best, top, ranked, widened = plain, 0.0, list(first), {plain.name}
-    others = (0.0, found.unknown)
+    others, least = (0.0, found.unknown), -np.inf
     while ranked:
         widen(known, best, ranked, found.unknown > 0)
         finish(known, others)
-        exchange(known, candidates, widened, found.unknown > 0)
+        exchange(known, candidates, widened, found.unknown > 0, least)
         finish(known, others)
         if not known.models:
             break  # nothing gains to first order, and no beginning calls for anything
@@ -76,8 +76,11 @@ def search(
         best, top = leader, odds
         widened.add(best.name)
         ranked = rank(FirstOrder(best.response), candidates)
-        if top + max(r.gain + prior.of_laws([r.candidate.name]) for r in ranked) < found.unknown:
+        could = [r for r in ranked if top + r.gain + prior.of_laws([r.candidate.name]) > found.unknown]
+        if not could:
             break  # no law more could come up to a free discrepancy
+        if len(names) + 1 == DEEPEST:  # what stays below it there stays below it
+            ranked, least = could, found.unknown
     models = known.ordered
     return Found(plain, found.unknown, tuple(h for h, _ in models), tuple(o for _, o in models), tuple(first))
 

@@ -9,7 +9,7 @@ import pytest
 
 from compass_ros.calibration.cost import Point, cost, start
 from compass_ros.calibration.differences import central, linearise
-from compass_ros.calibration.least_squares import Fit, minimise, normal_equations
+from compass_ros.calibration.least_squares import Fit, lowest, minimise, normal_equations, stretched, tried
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.settle import settled
 from compass_ros.types import Floats
@@ -165,3 +165,31 @@ def test_ripples_of_the_cost_do_not_hold_a_fit_that_settles() -> None:
     error = np.sqrt(np.diag(np.linalg.inv(hessian)))
     assert np.abs((off.values - best) / error).max() > 3
     assert np.abs((settled(given, begun).point.values - best) / error).max() < 1
+
+
+def test_a_step_through_a_valley_that_is_flatter_than_it_looks_is_stretched() -> None:
+    """Where differences show eight times the curvature that is there, as the roughness of contacts lets them."""
+    given = likelihood(linear, TRUTH, INPUTS, noise=0.01)
+    far = start(given, np.array([0.0, 0.0, 0.0]))
+    at = replace(far, cost=total(given, far, PLAIN))
+    hessian, gradient = normal_equations(given, at, linearise(given, at, FREE, np.full(3, 0.02)), FREE, PLAIN)
+    seeming = 8 * hessian, gradient
+    short = lowest(tried(given, at, FREE, seeming, PLAIN, [1e-9]))
+    assert at.cost - short.point.cost > 1.5 * short.hoped
+    long = lowest(stretched(given, at, FREE, seeming, PLAIN, short))
+    np.testing.assert_allclose(long.point.values, ridge(given), atol=1e-5)
+
+
+def test_a_last_step_needs_no_differences_after_it() -> None:
+    given, asked = likelihood(linear, TRUTH, INPUTS, noise=0.01), 0
+
+    def counted(values: Floats, inputs: Floats, time_s: Floats) -> Floats:
+        nonlocal asked
+        asked += len(values) == (1 + len(FREE)) * len(INPUTS)
+        return linear(values, inputs, time_s)
+
+    fit = minimise(replace(given, predict=counted), start(given, np.zeros(3)), FREE, 10, PLAIN, tolerance=1.0)
+    assert fit.converged
+    assert asked == 2  # at the start, and before the last step
+    best = Point(ridge(given), fit.point.launch, 0.0)
+    assert total(given, fit.point, PLAIN) == pytest.approx(total(given, best, PLAIN), abs=0.1)

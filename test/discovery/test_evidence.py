@@ -137,6 +137,16 @@ def test_weights_follow_what_a_discrepancy_explains() -> None:
     assert found.log > without.log + 100
 
 
+def test_products_are_those_of_all_columns_where_pushes_begin_later() -> None:
+    tangent = drawn(5, robust=1.5)
+    later = np.arange(ROWS)[:, None] >= 7 * np.arange(PUSHES)
+    tangent = replace(tangent, pushes=tangent.pushes * later)
+    columns = np.concatenate([tangent.parameters, tangent.own, tangent.pushes, tangent.residual[:, :, None]], axis=2)
+    weight = 1 / np.sqrt(1 + (tangent.residual / 1.5) ** 2)
+    expected = np.einsum("ed,edi,edj->eij", weight, columns, columns)
+    np.testing.assert_allclose(tangent.normal.gram, expected, atol=1e-12)
+
+
 def test_normal_equations_know_the_constant_of_the_bound() -> None:
     tangent = drawn(14, robust=2.0)
     normal = Normal.of(tangent, tangent.residual)

@@ -153,9 +153,13 @@ def test_a_law_that_stood_for_another_is_exchanged(tmp_path: Path, monkeypatch: 
         return whole(parent, from_parent(parent, first, np.arange(len(parent.likelihood.inputs)), 4))
 
     wrong = grown(grown(plain, "quadratic_drag"), "actuation_delay")
+    unmatched = Known(Prior.of(asked), plain.free.alone, {}, set())
+    unmatched.take([wrong])
+    exchange(unmatched, asked, {plain.name}, called=True, least=np.inf)
+    assert unmatched.ordered[0][0] is wrong  # none could reach what is asked for
     known = Known(Prior.of(asked), plain.free.alone, {}, set())
     known.take([wrong])
-    exchange(known, asked, {plain.name}, called=True)
+    exchange(known, asked, {plain.name}, called=True, least=-np.inf)
     best, odds = known.ordered[0]
     assert {a.effect.name for a in best.laws} == {"coulomb_friction", "actuation_delay"}
     assert odds > known.models[wrong.name][1] + 10

@@ -14,7 +14,9 @@ import pytest
 
 from compass_ros.reporting import Candidate, ReportExtras, write_report
 from compass_ros.reporting.drawing import MAX_REPLAYS, distance_map, figure_data
+from compass_ros.reporting.numbers import MISSING
 from compass_ros.reporting.report import embedded_json, render
+from compass_ros.reporting.view.gap import ladder
 from compass_ros.reporting.words import VERDICT_TITLE
 from compass_ros.types import Graph, Replay, ReplayedTrack, Result, Verdict
 
@@ -186,6 +188,16 @@ def test_bare_result_renders(result: Result) -> None:
     assert "No episode was replayed." in said
     assert "Nothing held out" in said
     assert "nan" not in said.lower().split()
+
+
+def test_where_nothing_is_held_out_the_fitted_episodes_are_shown(result: Result) -> None:
+    gap = {model: {"fit": parts["fit"]} for model, parts in result.gap.items()}
+    shown = ladder(replace(result, gap=gap, held_out=()))
+    assert "fitted" in shown["on"]
+    assert all(row["place"] is not None for row in shown["rows"])
+    assert [row["text"] for row in shown["rows"]] == [row["fit"] for row in ladder(result)["rows"]]
+    assert {row["held_out"] for row in shown["rows"]} == {MISSING}
+    assert "never" in ladder(result)["on"]
 
 
 def spatial(result: Result, columns: int) -> Result:

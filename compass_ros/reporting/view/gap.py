@@ -30,30 +30,36 @@ class LogScale:
             return None
         return round(100 * (math.log10(value) - self.low) / (self.high - self.low), 2)
 
-    def ticks(self, unit: str) -> list[tuple[float, str]]:
-        """(place, label in thousandths of the unit) of the powers of ten in range."""
-        powers = range(math.ceil(self.low), math.floor(self.high) + 1)
-        return [(self.place(10.0**p) or 0.0, f"{10.0 ** (p + 3):g} m{unit}") for p in powers]
+    def ticks(self, unit: str = "") -> list[tuple[float, str]]:
+        """(place, label in thousandths) of the powers of ten in range; with the unit, where one is given."""
+        powers, said = range(math.ceil(self.low), math.floor(self.high) + 1), f" m{unit}" if unit else ""
+        return [(self.place(10.0**p) or 0.0, f"{10.0 ** (p + 3):g}{said}") for p in powers]
 
 
 def ladder(result: Result) -> dict[str, Any]:
-    """The headline figure: held-out error of each model beside the noise floor, on a logarithmic line."""
+    """The headline figure: error of each model beside the noise floor, on a logarithmic line.
+
+    On held-out episodes where there are any, else on the fitted ones.
+    """
     models = [m for m in MODELS if m in result.gap]
-    scale = LogScale([*(held_out_rmse(result, m) for m in models), result.noise_floor_m])
+    unseen = bool(result.held_out)
+    errors = {m: held_out_rmse(result, m) if unseen else fit_rmse(result, m) for m in models}
+    scale = LogScale([*errors.values(), result.noise_floor_m])
     rows = []
-    for model in models:
-        error = held_out_rmse(result, model)
+    for model, error in errors.items():
         rows.append(
             {
                 "key": model,
                 "label": MODEL_LABEL[model],
                 "place": scale.place(error),
                 "text": thousandths(error),
+                "held_out": thousandths(held_out_rmse(result, model)),
                 "fit": thousandths(fit_rmse(result, model)),
                 "times": _times(error / result.noise_floor_m) if result.noise_floor_m > 0 else "",
             }
         )
     return {
+        "on": "episodes that were never fitted" if unseen else "the fitted episodes, for none was held out",
         "rows": rows,
         "ticks": scale.ticks(result.unit),
         "floor": scale.place(result.noise_floor_m),
@@ -152,5 +158,5 @@ def episodes(result: Result) -> dict[str, Any]:
         for i, replay in enumerate(replays)
     ]
     left_out = max(len(result.replays) - MAX_REPLAYS, 0)
-    ticks, floor = scale.ticks(result.unit), scale.place(result.noise_floor_m)
+    ticks, floor = scale.ticks(), scale.place(result.noise_floor_m)  # the column's head has the unit
     return {"rows": rows, "ticks": ticks, "floor": floor, "left_out": left_out}
