@@ -20,7 +20,7 @@ from compass_ros.types import Bools, Floats, Ints
 CANCELS = 0.1
 """Movement along a direction, as a share of what its parameters would do if they did not cancel."""
 ROUNDS = 4
-"""How often directions are asked, at most: a step is as short as the roughness that has passed for information makes it,
+"""How often directions are asked, at most: a step is as short as roughness that has passed for information makes it,
 and the next one, beside what it has shown, as long as the prior allows."""
 FARTHER, ELSEWHERE = 2.0, 0.3
 """What a direction must be to be asked then: so many times as long as those that were asked, or with so large a part

@@ -18,7 +18,7 @@ from compass_ros.reporting.numbers import MISSING
 from compass_ros.reporting.report import embedded_json, render
 from compass_ros.reporting.view.gap import ladder
 from compass_ros.reporting.words import VERDICT_TITLE
-from compass_ros.types import Graph, Replay, ReplayedTrack, Result, Verdict
+from compass_ros.types import Gap, Graph, Replay, ReplayedTrack, Result, Verdict
 
 HOSTILE = '</script><script>window.hacked=1</script><img src=x onerror="window.hacked=1">\'"&<!--'
 VOID = ("meta", "link", "img", "br", "wbr", "circle", "path")
@@ -191,8 +191,8 @@ def test_bare_result_renders(result: Result) -> None:
 
 
 def test_where_nothing_is_held_out_the_fitted_episodes_are_shown(result: Result) -> None:
-    gap = {model: {"fit": parts["fit"]} for model, parts in result.gap.items()}
-    shown = ladder(replace(result, gap=gap, held_out=()))
+    fitted: dict[Any, dict[Any, Gap]] = {model: {"fit": parts["fit"]} for model, parts in result.gap.items()}
+    shown = ladder(replace(result, gap=fitted, held_out=()))
     assert "fitted" in shown["on"]
     assert all(row["place"] is not None for row in shown["rows"])
     assert [row["text"] for row in shown["rows"]] == [row["fit"] for row in ladder(result)["rows"]]
