@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import mujoco
 import numpy as np
 
 from compass_ros.discovery.sites_asked import Pairs, choices, on_signals
@@ -79,6 +80,7 @@ def candidates(simulator: Simulator, values: Floats, inputs: Floats, time_s: Flo
         if effect.moves:
             out.extend(_on_movers(effect, simulator, joints))
             out.extend(_in_space(effect, simulator, visited))
+            out.extend(_on_links(effect, simulator, visited) if effect.on_links else ())
         elif effect.on_walls:
             out.extend(Attached(effect, (wall,)) for wall in simulator.places.walls)
         elif any(kind in DRIVES for kind in effect.on):
@@ -119,6 +121,37 @@ def _in_space(effect: Effect, simulator: Simulator, visited: Visited) -> Iterato
     for site in able:
         sized = effect.at(sizes[site.name]) if effect.on_body else effect.on_kinds(("body",))
         yield Attached(sized, site.names)
+
+
+def _on_links(effect: Effect, simulator: Simulator, visited: Visited) -> Iterator[Attached]:
+    """Each last link of the arms whose joints are tracked, or all of their links, and what is fixed to these, together.
+
+    What may hang on the last link is measured by the mean of all: a flange is light.
+    """
+    model, places = simulator.places.model, simulator.places
+    own = {int(model.joint(name).bodyid[0]) for name, site in simulator.moving.items() if site.kind in JOINTS}
+    carried = {body: _above(model, body) for body in range(1, model.nbody)}
+    able = {body: site for body, above in carried.items()
+            if above & own and model.body_mass[body] > 0 and (site := places.body(str(model.body(body).name)))
+            and site.kind == "body" and effect.takes(model, site)}  # fmt: skip
+    if not able:
+        return
+    if effect.on_links == "all":
+        yield Attached(effect.on_kinds(("body",)), names_of(list(able.values())))
+        return
+    last = [body for body in able if body in own and not any(body in carried[other] - {other} for other in own)]
+    mean, sizes = model.body_mass[list(able)].mean(), visited.paths_in_space([able[body].name for body in last])[0]
+    for size, body in zip(sizes.values(), last, strict=True):
+        yield Attached(effect.at(replace(size, mass=max(size.mass, float(mean)))), able[body].names)
+
+
+def _above(model: mujoco.MjModel, body: int) -> set[int]:
+    """A body and all those that carry it."""
+    found = set()
+    while body:
+        found.add(body)
+        body = int(model.body_parentid[body])
+    return found
 
 
 def _on_drives(effect: Effect, simulator: Simulator, visited: Visited) -> Iterator[Attached]:

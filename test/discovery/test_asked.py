@@ -56,13 +56,15 @@ def near_the_top(found: list[Ranked], law: str, on: tuple[str, ...]) -> Ranked:
         ("eccentricity", "joints.s", {"cosine": 1.0, "sine": 3.0}),
         ("latency", "joints.e", {"latency": 1.0}),
         ("clock_drift", "", {"rate": 1.0}),
+        ("payload", "fore", {"mass": 10.0}),
+        ("gravity_tilt", "upper+fore", {"tilt_x": 1.0}),
     ],
 )
 def test_a_law_on_one_joint_drive_or_encoder_is_seen_there(
     tmp_path: Path, law: str, on: str, sizes: dict[str, float]
 ) -> None:
     cell = asked.arm(tmp_path)
-    at = (on,) if on else ()
+    at = tuple(on.split("+")) if on else ()
     found = near_the_top(ranked(cell, asked.steps(cell, 6), law, at, sizes), law, at)
     assert found.seen
     if law == "cogging":
@@ -95,6 +97,8 @@ def test_adhesion_is_seen_where_a_foot_sticks(tmp_path: Path) -> None:
         ("joint_elasticity", "e", {"compliance": 2.0}),
         ("backlash", "e", {"play": 1.0}),
         ("torque_saturation", "ds", {"inverse_limit": 15.0}),
+        ("payload", "fore", {"mass": 15.0, "x": 0.02, "z": -0.1}),
+        ("gravity_tilt", "upper+fore", {"tilt_x": 2.0}),
         ("adhesion", "pad+foot", {"force": 10.0}),
     ],
 )

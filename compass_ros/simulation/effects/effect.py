@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import mujoco
 import numpy as np
@@ -97,6 +98,9 @@ class Effect:
     """Its quantities between two geoms or bodies; None: it acts on no pair."""
     on_signal: Callable[[SignalSize], tuple[Quantity, ...]] | None = None
     """Its quantities on one signal, from what that shows; None: `quantities`."""
+    on_links: Literal["", "each last", "all"] = ""
+    """On the links of an arm, which nothing tracks: whether it is looked for on each last one, or on all of them
+    together; empty: on neither."""
     loaded: bool = False
     """Whether it acts by the force that drives a joint, which its path does not say."""
     rotor: bool = False

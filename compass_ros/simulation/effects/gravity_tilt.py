@@ -32,4 +32,5 @@ EFFECT = Effect(
     on=("body",),
     forces=_forces,
     unable=weightless,
+    on_links="all",
 )

@@ -69,4 +69,5 @@ EFFECT = Effect(
     on=("body",),
     model=_model,
     on_body=_on_body,
+    on_links="each last",
 )
