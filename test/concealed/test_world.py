@@ -50,7 +50,7 @@ def effects(world: World) -> Any:
     return world.answer["effects"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_same_seed_gives_the_same_bits(tilted: World) -> None:
     again = sure(Wishes(3, noise="none", rms_m=ASKED_M, names=("table_tilt",)))
     assert again.answer == tilted.answer

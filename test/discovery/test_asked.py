@@ -92,14 +92,14 @@ def test_adhesion_is_seen_where_a_foot_sticks(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("law", "on", "sizes"),
     [
-        ("cogging", "s", {"cosine": 2.0, "sine": -1.0, "periods": 17.3}),
-        ("load_dependent_friction", "s", {"coefficient": 3.0}),
-        ("joint_elasticity", "e", {"compliance": 2.0}),
+        pytest.param("cogging", "s", {"cosine": 2.0, "sine": -1.0, "periods": 17.3}, marks=pytest.mark.nightly),
+        pytest.param("load_dependent_friction", "s", {"coefficient": 3.0}, marks=pytest.mark.nightly),
+        pytest.param("joint_elasticity", "e", {"compliance": 2.0}, marks=pytest.mark.nightly),
         ("backlash", "e", {"play": 1.0}),
-        ("torque_saturation", "ds", {"inverse_limit": 15.0}),
+        pytest.param("torque_saturation", "ds", {"inverse_limit": 15.0}, marks=pytest.mark.nightly),
         ("payload", "fore", {"mass": 15.0, "x": 0.02, "z": -0.1}),
-        ("gravity_tilt", "upper+fore", {"tilt_x": 2.0}),
-        ("adhesion", "pad+foot", {"force": 10.0}),
+        pytest.param("gravity_tilt", "upper+fore", {"tilt_x": 2.0}, marks=pytest.mark.nightly),
+        pytest.param("adhesion", "pad+foot", {"force": 10.0}, marks=pytest.mark.nightly),
     ],
 )
 def test_such_a_law_is_named_with_its_site_and_its_numbers(

@@ -32,10 +32,10 @@ def said(cell_of: Path, laws: Sequence[str], numbers: Sequence[float], force: fl
     ("law", "numbers", "force"),
     [
         ("coulomb_friction", [0.08, 0.0], 1.0),
-        ("coulomb_friction", [0.08, 0.0], 1e-3),
-        ("coulomb_friction", [0.08, 0.0], 4096.0),
+        pytest.param("coulomb_friction", [0.08, 0.0], 1e-3, marks=pytest.mark.nightly),
+        pytest.param("coulomb_friction", [0.08, 0.0], 4096.0, marks=pytest.mark.nightly),
         ("stribeck_friction", [0.15, 1.0], 1.0),
-        ("stribeck_friction", [0.15, 3.0], 1e-3),
+        pytest.param("stribeck_friction", [0.15, 3.0], 1e-3, marks=pytest.mark.nightly),
         ("quadratic_drag", [0.02], 1.0),
         ("spring", [1.0, 0.4, 0.0], 1.0),
         ("actuation_delay", [0.03], 1.0),
@@ -88,8 +88,11 @@ def test_two_laws_on_a_servo_are_both_named(tmp_path: Path) -> None:
     [
         (("hinge", "hinge"), (), "", "", []),
         (("hinge", "hinge"), (), "stribeck_friction", "j1", [0.028, 0.8]),
-        (("hinge", "slide"), ("motor", "motor"), "spring", "j1", [0.34, -1.0]),
-        (("hinge", "slide", "hinge"), ("intvelocity", "muscle", "general"), "coulomb_friction", "j2", [0.07, 0.0]),
+        pytest.param(("hinge", "slide"), ("motor", "motor"), "spring", "j1", [0.34, -1.0], marks=pytest.mark.nightly),
+        pytest.param(
+            *(("hinge", "slide", "hinge"), ("intvelocity", "muscle", "general"), "coulomb_friction", "j2", [0.07, 0.0]),
+            marks=pytest.mark.nightly,
+        ),
         (("hinge",) * 3, ("position",) * 3, "viscous_drag", "j1", [0.16]),
     ],
 )

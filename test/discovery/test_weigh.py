@@ -132,7 +132,7 @@ def test_recordings_of_an_encoder_are_simulated_in_whole_steps(tmp_path: Path) -
     assert white.std() == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_law_that_stood_for_another_is_exchanged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Dry friction and a delay of the command are missing; a drag was taken first, and the delay beside it."""
     cell = servo(tmp_path)

@@ -60,7 +60,7 @@ def test_a_blind_process_can_do_everything_else(tmp_path: Path) -> None:
     assert refused(f"open('{tmp_path}/free.txt'); import compass_ros.pipeline", tmp_path / "answers") == ""
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_sealed_world() -> None:
     """The seal holds, the calibrator never opened the answer, and its verdict is right; nothing missing: test_demo."""
     line: Any = run(Suite("tilt", ("--effect", "table_tilt", "--rms", "4e-3"), 2), 2, "default", threads=2)

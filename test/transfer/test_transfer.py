@@ -44,6 +44,7 @@ def test_a_campaign_goes_on_where_it_was(tmp_path: Path) -> None:
     assert "as it was drawn" in table.tables(campaign.read(file))
 
 
+@pytest.mark.nightly
 def test_a_policy_over_time_is_trained_played_and_kept(tmp_path: Path) -> None:
     task = push_i()
     belief_ = one(Simulator(task.cell, threads=1, options={"timestep": 0.001}), task.cell.defaults)
