@@ -18,7 +18,7 @@ from scipy.optimize import lsq_linear
 from compass_ros.calibration.cost import robust_weight
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.response import Response
-from compass_ros.discovery.shapes import best_shapes
+from compass_ros.discovery.shapes import best_shapes, shape_grid
 from compass_ros.types import Floats, Ints
 
 SIGMAS = 5.0
@@ -200,10 +200,13 @@ class FirstOrder:
         return [one for one in found if one]
 
     def _shapes_seen(self, candidate: Candidate) -> list[Floats]:
-        """(q,) shapes of a law of a sensor that has to be searched; of another one where its search begins."""
+        """(q,) shapes of a law of a sensor that has to be searched; of another one where its search begins, and each
+        shape that has to be looked at elsewhere at its places, the others as they are."""
         quantities, effect = candidate.quantities, candidate.attached.effect
-        if effect.sensing is None or not any(q.grid > 1 for q in quantities):
-            return [np.array([0.0 if q.amplitude else q.start for q in quantities])]
+        begins = np.array([0.0 if q.amplitude else q.start for q in quantities])
+        elsewhere = [(i, at) for i, q in enumerate(quantities) if q.grid > 1 for at in shape_grid(q) if at != q.start]
+        if effect.sensing is None or not elsewhere:
+            return [begins, *(np.where(np.arange(len(begins)) == i, at, begins) for i, at in elsewhere)]
         low, high, scale = _bounds(candidate)
         law, steps = self.response.bent(candidate.attached), np.zeros((len(scale), len(quantities)))
         steps[:, candidate.amplitudes] = np.diag(scale)

@@ -57,6 +57,7 @@ def near_the_top(found: list[Ranked], law: str, on: tuple[str, ...]) -> Ranked:
         ("latency", "joints.e", {"latency": 1.0}),
         ("clock_drift", "", {"rate": 1.0}),
         ("payload", "fore", {"mass": 10.0}),
+        ("payload", "fore", {"mass": 10.0, "z": -0.2}),
         ("gravity_tilt", "upper+fore", {"tilt_x": 1.0}),
     ],
 )

@@ -57,7 +57,7 @@ def _off_centre(model: mujoco.MjModel, body: int, offset: Floats, own: float, ad
 def _on_body(size: BodySize) -> tuple[Quantity, ...]:
     reach = _REACH * size.extent
     mass = Quantity("mass", "kg", 0.0, LARGEST * size.mass, MODEST * size.mass)
-    places = [Quantity(axis, "m", -reach, reach, size.extent, amplitude=False) for axis in "xyz"]
+    places = [Quantity(axis, "m", -reach, reach, size.extent, amplitude=False, grid=3) for axis in "xyz"]
     return (mass,) if size.centred else (mass, *places)
 
 
