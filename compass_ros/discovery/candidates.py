@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-import mujoco
 import numpy as np
 
 from compass_ros.discovery.sites_asked import Pairs, choices, on_signals
@@ -128,30 +127,14 @@ def _on_links(effect: Effect, simulator: Simulator, visited: Visited) -> Iterato
 
     What may hang on the last link is measured by the mean of all: a flange is light.
     """
-    model, places = simulator.places.model, simulator.places
-    own = {int(model.joint(name).bodyid[0]) for name, site in simulator.moving.items() if site.kind in JOINTS}
-    carried = {body: _above(model, body) for body in range(1, model.nbody)}
-    able = {body: site for body, above in carried.items()
-            if above & own and model.body_mass[body] > 0 and (site := places.body(str(model.body(body).name)))
-            and site.kind == "body" and effect.takes(model, site)}  # fmt: skip
-    if not able:
+    places, joints = simulator.places, [name for name, site in simulator.moving.items() if site.kind in JOINTS]
+    links, last = ([site for site in sites if effect.takes(places.model, site)] for sites in places.links(joints))
+    if effect.on_links == "all" and links:
+        yield Attached(effect.on_kinds(("body",)), names_of(links))
         return
-    if effect.on_links == "all":
-        yield Attached(effect.on_kinds(("body",)), names_of(list(able.values())))
-        return
-    last = [body for body in able if body in own and not any(body in carried[other] - {other} for other in own)]
-    mean, sizes = model.body_mass[list(able)].mean(), visited.paths_in_space([able[body].name for body in last])[0]
-    for size, body in zip(sizes.values(), last, strict=True):
-        yield Attached(effect.at(replace(size, mass=max(size.mass, float(mean)))), able[body].names)
-
-
-def _above(model: mujoco.MjModel, body: int) -> set[int]:
-    """A body and all those that carry it."""
-    found = set()
-    while body:
-        found.add(body)
-        body = int(model.body_parentid[body])
-    return found
+    mean = float(np.mean([places.model.body(site.name).mass for site in links])) if links else 0.0
+    for site, size in zip(last, visited.paths_in_space(names_of(last))[0].values() if last else (), strict=True):
+        yield Attached(effect.at(replace(size, mass=max(size.mass, mean))), site.names)
 
 
 def _on_drives(effect: Effect, simulator: Simulator, visited: Visited) -> Iterator[Attached]:

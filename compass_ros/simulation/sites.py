@@ -159,6 +159,17 @@ class Places:
         pressed = self.model.opt.gravity[2] < 0
         return Site(("table" if name in self.sliding else "lying") if pressed else "planar", (name,))
 
+    def links(self, joints: Collection[str]) -> tuple[tuple[Site, ...], tuple[Site, ...]]:
+        """Bodies that these joints move, what is fixed to them too, and of them the last ones, beyond which no other of
+        these joints is; those that have a mass and a name."""
+        model = self.model
+        own = {int(model.joint(name).bodyid[0]) for name in joints}
+        above = {body: carriers(model, body) for body in range(1, model.nbody)}
+        found = {body: site for body in above if above[body] & own and model.body_mass[body] > 0
+                 and (site := self.body(str(model.body(body).name))) and site.kind == "body"}  # fmt: skip
+        last = [body for body in found if body in own and not any(body in above[b] - {b} for b in own)]
+        return tuple(found.values()), tuple(found[body] for body in last)
+
     def wall(self, name: str) -> Site | None:
         """A fixed geom of that name that stands in a contact pair."""
         return Site("wall", (name,)) if name in self.walls else None
@@ -321,6 +332,15 @@ def in_words(kinds: Collection[SiteKind]) -> str:
         return "drive of one actuator"
     wider = [k for k in kinds if not (k in LYING and "planar" in kinds) and not (k == "table" and "lying" in kinds)]
     return " or ".join(_WORDS.get(kind, kind.replace("_", " ")) for kind in wider)
+
+
+def carriers(model: mujoco.MjModel, body: int) -> set[int]:
+    """A body and all those that carry it."""
+    found = set()
+    while body:
+        found.add(body)
+        body = int(model.body_parentid[body])
+    return found
 
 
 def names_of(sites: Iterable[Site]) -> tuple[str, ...]:
