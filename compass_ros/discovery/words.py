@@ -40,13 +40,18 @@ def where_of(laws: Sequence[Attached], numbers: Floats, movers: Sequence[str]) -
     named = (name for law in laws if law.effect.name == effect.name for name in law.objects)
     objects = dict.fromkeys(name.partition("@")[0] for name in named)
     told = bool(objects) and set(objects) != set(movers)
-    one = " and ".join(objects) if told else "all"
+    one = listed(tuple(objects)) if told else "all"
     names = [q.name for q in effect.quantities]
     region = None
     if (size := next((n for n in ("radius", "core") if n in names), None)) is not None and "centre_x" in names:
         x, y, far = (float(numbers[names.index(name)]) for name in ("centre_x", "centre_y", size))
         region = Region((x, y), far)
     return Where(one, phase, effect.channel, region)
+
+
+def listed(names: Sequence[str]) -> str:
+    """'a, b and c'."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def place(where: Where, flat: bool = True) -> str:
@@ -56,7 +61,7 @@ def place(where: Where, flat: bool = True) -> str:
     """
     words = (IN_WORDS if flat else OF_JOINTS)[where.phase]
     if where.object != "all":
-        words += f" of {where.object}"
+        words = f"In {where.object}" if where.phase == "all" else f"{words} of {where.object}"
     if where.region:
         x, y = where.region.centre_m
         words += f", within {100 * where.region.radius_m:.0f} cm of ({x:.2f}, {y:.2f})"

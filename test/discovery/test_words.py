@@ -31,3 +31,12 @@ def test_a_field_on_one_of_two_pucks_has_a_place() -> None:
     assert place(where) == "On free slides of puck1, within 12 cm of (0.02, -0.01)"
     both = where_of([Attached(fan.effect, ("puck1", "puck2"))], np.array(numbers), ("puck1", "puck2"))
     assert place(both).startswith("On free slides, within")
+
+
+def test_several_sites_are_listed() -> None:
+    latency = Attached(EFFECTS["latency"], ("joints.a", "joints.b", "joints.c"))
+    numbers = np.array([q.start for q in latency.effect.quantities])
+    assert place(where_of([latency], numbers, ("a", "b", "c")), flat=False) == "In joints.a, joints.b and joints.c"
+    load = Attached(EFFECTS["payload"], ("tool",))
+    numbers = np.array([q.start for q in load.effect.quantities])
+    assert place(where_of([load], numbers, ("a", "b", "c")), flat=False) == "In the motion of tool"
