@@ -8,7 +8,7 @@ import numpy as np
 
 from compass_ros.calibration.cost import Point
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.types import Floats, Ints
+from compass_ros.types import Bools, Floats, Ints
 
 FIRST_STEP = 0.02
 """First finite differences, in standard deviations of the prior."""
@@ -34,6 +34,10 @@ class Linear:
         """The same of some episodes."""
         parts = (self.residual, self.jacobian, self.launch_jacobian, self.onset)
         return Linear(*(part[episodes] for part in parts))
+
+    def only(self, free: Ints | Bools) -> Linear:
+        """The same of some of the free parameters."""
+        return replace(self, jacobian=self.jacobian[..., free], onset=self.onset[:, free])
 
 
 def inward(likelihood: Likelihood, point: Point, which: Ints, steps: Floats) -> Floats:

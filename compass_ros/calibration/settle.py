@@ -17,7 +17,8 @@ SERVE = 8
 """Steps that they serve, at most: a budget."""
 BENDS = 4
 """How often a valley along which parameters cancel is asked anew beside the same differences, at most: a budget. It
-bends, and asking it costs a quarter of them."""
+bends, and asking it costs a quarter of them. On that arm one set of differences ends at 15,062 with them and at 15,096
+without; after three it is at 15,046.5."""
 FINE = (0.1, 0.03)
 """Lengths of these differences, in turn, as shares of those that move the residual by one sigma. The short ones are
 exact; the long ones see past what the simulator's steps at contacts do to a short one."""

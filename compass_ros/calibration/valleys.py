@@ -21,7 +21,8 @@ CANCELS = 0.1
 """Movement along a direction, as a share of what its parameters would do if they did not cancel."""
 ROUNDS = 4
 """How often directions are asked, at most: a step is as short as roughness that has passed for information makes it,
-and the next one, beside what it has shown, as long as the prior allows."""
+and the next one, beside what it has shown, as long as the prior allows. Of two dampings that add up, rough by a
+fiftieth of sigma, the difference has error bars of 0.03 of the prior's before, 0.57 after two, 1.00 after three."""
 FARTHER, ELSEWHERE = 2.0, 0.3
 """What a direction must be to be asked then: so many times as long as those that were asked, or with so large a part
 across them."""

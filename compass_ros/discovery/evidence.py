@@ -28,8 +28,9 @@ from compass_ros.types import Floats
 ROUNDS = 2
 """How often weights are taken anew, as long as the bound rises by SLIGHT: a tenth of what odds are read to."""
 SLIGHT = 0.1
-PIECES = 24
-"""Into which an episode is cut for its products: about as many as pushes have moments."""
+PIECES = 6
+"""Into which an episode is cut for its products: a budget. Nine windows of 530 frames of seven signals, 50 moments:
+1.2 s of processor time in one piece, 0.41 in 4, 0.36 in 6, 0.46 in 10, 0.55 in 24."""
 ROUNDING = 1e-12
 """Share of a column that sums over ten thousand rows in double precision leave open."""
 

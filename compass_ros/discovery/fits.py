@@ -222,8 +222,7 @@ def without(model: Hypothesis, laws: Sequence[Attached]) -> Hypothesis:
         prior_std=of_all.prior_std[at],
     )
     point = replace(model.fit.point, values=model.fit.point.values[at], cost=np.inf)
-    free, linear = np.flatnonzero(np.isin(at, model.fit.free)), model.fit.linear
-    left = np.isin(model.fit.free, at)
-    linear = replace(linear, jacobian=linear.jacobian[..., left], onset=linear.onset[:, left])
+    free = np.flatnonzero(np.isin(at, model.fit.free))
+    linear = model.fit.linear.only(np.isin(model.fit.free, at))
     fit = minimise(likelihood, point, free, FEW, model.fit.robust, _SLIGHT, linear)
     return Hypothesis(tuple(kept), simulator, likelihood, fit, without=model.bare)

@@ -183,9 +183,7 @@ class Hypothesis:
         """The fit with the shapes of its laws no longer free."""
         shapes = [n.start + np.flatnonzero(~attached.amplitudes) for attached, n in self.own()]
         kept = np.flatnonzero(~np.isin(self.fit.free, np.concatenate([*shapes, np.empty(0, int)])))
-        linear = self.fit.linear
-        narrow = replace(linear, jacobian=linear.jacobian[..., kept], onset=linear.onset[:, kept])
-        return replace(self.fit, linear=narrow, free=self.fit.free[kept])
+        return replace(self.fit, linear=self.fit.linear.only(kept), free=self.fit.free[kept])
 
     @property
     def rho(self) -> float:

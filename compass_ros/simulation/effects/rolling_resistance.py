@@ -12,7 +12,7 @@ import mujoco
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.extents import PairSize, unit_pair
 from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.simulation.sites import Site, slides_in_plane
+from compass_ros.simulation.sites import Site, carriers, slides_in_plane
 from compass_ros.simulation.sizes import MODEST
 from compass_ros.types import Floats
 
@@ -34,12 +34,11 @@ def _unable(model: mujoco.MjModel, site: Site) -> str:
 def _rolls(model: mujoco.MjModel, body: int) -> bool:
     """Whether it, or what carries it, can turn, but for one that stays upright on a plane."""
     turning = {mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL, mujoco.mjtJoint.mjJNT_HINGE}
-    while body:
-        first = int(model.body_jntadr[body])
-        kinds = set(model.jnt_type[first : first + int(model.body_jntnum[body])].tolist())
-        if kinds & turning and not slides_in_plane(model, body):
+    for one in carriers(model, body):
+        first = int(model.body_jntadr[one])
+        kinds = set(model.jnt_type[first : first + int(model.body_jntnum[one])].tolist())
+        if kinds & turning and not slides_in_plane(model, one):
             return True
-        body = int(model.body_parentid[body])
     return False
 
 
