@@ -85,7 +85,7 @@ def settings(
     false_alarm: float,
 ) -> Mapping[str, object]:
     """The configuration file's fields over the command line's."""
-    from compass_ros.config import read_yaml
+    from compass_ros.config import calibration_config, read_yaml
 
     given: dict[str, object] = {
         "method": method,
@@ -97,7 +97,9 @@ def settings(
         "discover": discover,
         "false_alarm": false_alarm,
     }
-    return given | (dict(read_yaml(config)) if config else {})
+    in_file = dict(read_yaml(config)) if config else {}
+    calibration_config(in_file, str(config))  # what is wrong in a file is said with its name
+    return given | in_file
 
 
 def run(
