@@ -10,7 +10,7 @@ from compass_ros.calibration.cost import robust_weight
 from compass_ros.calibration.least_squares import normal_equations
 from compass_ros.discovery.evidence import solve
 from compass_ros.discovery.hypothesis import Hypothesis
-from compass_ros.discovery.time_step import moved_by
+from compass_ros.discovery.nuisances import moved_by
 from compass_ros.simulation.numerics import other_numerics
 from compass_ros.types import Floats
 
@@ -40,7 +40,7 @@ def numerics_as_model(plain: Hypothesis, best: float) -> str:
     What it moves is taken as it is, to first order beside the parameters: a model without a number of its own.
     """
     tangent, shape = plain.response.tangent, plain.response.tangent.residual.shape
-    for what, options in other_numerics(plain.simulator):
+    for what, options in other_numerics(plain.simulator.options):
         moved = moved_by(plain.simulator, plain.likelihood, plain.fit, options)
         changed = replace(tangent, residual=tangent.residual + moved.reshape(shape))
         if solve(changed, changed.normal, None).log - plain.free.alone > best:

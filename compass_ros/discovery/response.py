@@ -12,9 +12,9 @@ from compass_ros.calibration.cost import launches_away
 from compass_ros.calibration.least_squares import Fit, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.evidence import Tangent
+from compass_ros.discovery.nuisances import nuisances
 from compass_ros.discovery.objections import frame_rate
 from compass_ros.discovery.settings import MOMENTS
-from compass_ros.discovery.time_step import finite_step
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.simulation.extents import along
@@ -61,19 +61,19 @@ class Response:
 
     @cached_property
     def tangent(self) -> Tangent:
-        """Beside the parameters stands what the finite time step does, as a nuisance: nature has none."""
+        """Beside the parameters stand the engine's approximations, as nuisances."""
         likelihood, fit = self.likelihood, self.fit
         episodes = len(likelihood.inputs)
         linear, point = fit.linear, fit.point
         rows = (episodes, linear.residual[0].size)
-        finite = finite_step(self.simulator, likelihood, fit).reshape(*rows, 1)
+        engine = nuisances(self.simulator, likelihood, fit).reshape(*rows, -1)
         known = ((likelihood.prior_mean - point.values) / likelihood.prior_std)[fit.free[self.inside]]
         return Tangent(
             residual=linear.residual.reshape(rows),
-            parameters=np.concatenate([linear.jacobian.reshape(*rows, -1)[:, :, self.inside], finite], axis=2),
+            parameters=np.concatenate([linear.jacobian.reshape(*rows, -1)[:, :, self.inside], engine], axis=2),
             own=linear.launch_jacobian.reshape(*rows, -1),
             pushes=self.pushes.reshape(*rows, -1),
-            away=np.append(known, 0.0),
+            away=np.append(known, np.zeros(engine.shape[2])),
             own_away=-launches_away(likelihood, point),
             robust=fit.robust,
             correlation_time=likelihood.correlation_time,

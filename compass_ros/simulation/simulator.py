@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import mujoco
 import numpy as np
@@ -19,6 +19,7 @@ from compass_ros.simulation.alike import roll_alike
 from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.effect import Effect
 from compass_ros.simulation.native.program import evaluate, path_columns
+from compass_ros.simulation.numerics import set_numerics
 from compass_ros.simulation.physics import Physics, interpolate, places_of
 from compass_ros.simulation.player import Player
 from compass_ros.simulation.sites import Places, Site
@@ -60,13 +61,14 @@ class Simulator:
     """
 
     def __init__(
-        self, cell: Cell, effects: Sequence[Attached] = (), threads: int = 0, options: Mapping[str, float] | None = None
-    ) -> None:
-        """`options`: MuJoCo's numerics (`timestep`, `cone`, `solver`, ...) where they are not to be the scene's."""
+        self, cell: Cell, effects: Sequence[Attached] = (), threads: int = 0,
+        options: Mapping[str, float] | None = None, softness: Mapping[str, float] | None = None,
+    ) -> None:  # fmt: skip
+        """`options`: MuJoCo's numerics (`timestep`, `cone`, `solver`, ...) where they are not to be the scene's.
+        `softness`: what is left of the regularisation of joints' dry friction, as a share (`set_numerics`)."""
+        self._numerics = partial(set_numerics, options=options or {}, softness=softness or {})
         dynamics = dynamics_of(cell)
-        self._options = options or {}
-        for name, value in self._options.items():
-            setattr(dynamics.model.opt, name, value)
+        self._numerics(dynamics.model)
         drives = Drives(cell, dynamics.model)
         self.physics = Physics(cell, dynamics, places_of(cell, dynamics, drives), (), drives)
         self._players: dict[tuple[str, ...], Player] = {(): Player(dynamics.model, threads)}
@@ -111,8 +113,7 @@ class Simulator:
         if cell.rotors == self.cell.rotors:
             return physics
         dynamics = dynamics_of(cell)
-        for name, value in self._options.items():
-            setattr(dynamics.model.opt, name, value)
+        self._numerics(dynamics.model)
         return replace(physics, cell=cell, dynamics=dynamics, drives=Drives(cell, dynamics.model))
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,14 +16,15 @@ from compass_ros.calibration.least_squares import Fit
 from compass_ros.cells import load
 from compass_ros.discovery.evidence import evidences
 from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.nuisances import finite_step
 from compass_ros.discovery.numerics import numerics_as_model
 from compass_ros.discovery.planned import perfect
 from compass_ros.discovery.response import Response
-from compass_ros.discovery.time_step import finite_step
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.simulation.manifold import apart, charted
 from test.discovery.planted import CALM, PUCKS, RATE, SIGMA, recorded, response_of
+from test.discovery.servo import NOISE, servo
 from test.simulation.table import cell, simulator
 
 
@@ -43,6 +45,25 @@ def test_a_finer_time_step_calls_for_nothing(share: float, noise: float) -> None
     )
     assert plain.free.log - plain.free.alone < 0
     assert evidences(response.tangent, [None])[0].log > evidences(blind, [None])[0].log + 5
+
+
+def test_friction_that_holds_where_the_engine_creeps_calls_for_nothing(tmp_path: Path) -> None:
+    """MuJoCo's dry friction is soft, nature's is not."""
+    creeps = Simulator(servo(tmp_path, dry=0.3), threads=1)
+    steps = np.random.default_rng(1).uniform(-1.2, 1.2, (6, 2))
+    clean = perfect(creeps, steps, 60.0, NOISE)
+    holds = Simulator(creeps.cell, threads=1, softness={"axis": 0.0})
+    measured = holds.observe(np.tile(creeps.defaults, (len(steps), 1)), steps, clean.time_s)
+    likelihood, free = replace(clean, measured=measured), np.arange(2)
+    point = start(likelihood, creeps.defaults)
+    fit = Fit(point, linearise(likelihood, point, free, np.full(2, 1e-3)), free, 1e6, 0, True)
+    plain = Hypothesis((), creeps, likelihood, fit)
+    tangent = plain.response.tangent
+    assert tangent.parameters.shape[2] == len(tangent.away) == 5
+    blind = replace(tangent, parameters=tangent.parameters[:, :, :-2], away=tangent.away[:-2])
+    assert plain.free.log < plain.free.alone
+    assert evidences(tangent, [None])[0].log > evidences(blind, [None])[0].log + 5
+    np.testing.assert_allclose(tangent.parameters[..., -1], -tangent.residual, atol=1e-9)
 
 
 def test_missing_drag_is_no_numerics() -> None:
