@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -11,22 +12,29 @@ from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.residuals import residual_at
 from compass_ros.simulation import Simulator
-from compass_ros.simulation.numerics import creeping
+from compass_ros.simulation.numerics import CONTACTS, creeping
 from compass_ros.simulation.sites import JOINTS
 from compass_ros.types import Floats
 
 SOFTER = (0.5, 0.0)
-"""Shares of the regularisation of dry friction: half, as engines may differ, and none, as in nature. What they do is not
-the same: of half of it a seven-joint arm moves by 0.1 to 0.25 mrad, and of all by 0.27 to 0.6, 0.75 to 0.96 alike."""
+"""Shares of the regularisation of dry friction: half, as engines may differ, and none, as in nature. What they do is
+not the same: half of it moves a seven-joint arm by 0.1 to 0.25 mrad, all by 0.27 to 0.6, with correlations of 0.75 to
+0.96."""
+IMPRATIO = 10.0
+"""Factor on the stiffness of friction over that of contacts: MuJoCo's documentation names it against slip."""
 
 
 def nuisances(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> Floats:
     """(E, F, C, N) changes of the residual [sigma] by approximations of the engine, each one standard deviation of a
-    nuisance of every model: the finite step, then how soft each joint's dry friction is."""
+    nuisance of every model: the finite step, how soft each joint's dry friction is, and contacts and their friction."""
+    moved = partial(moved_by, simulator, likelihood, fit)
     columns = [finite_step(simulator, likelihood, fit)]
     joints = [site.name for site in simulator.moving.values() if site.kind in JOINTS]
     for joint in creeping(simulator.written(fit.point.values), joints):
-        columns += [moved_by(simulator, likelihood, fit, softness={joint: share}) for share in SOFTER]
+        columns += [moved(softness={joint: share}) for share in SOFTER]
+    if simulator.places.touching:
+        columns.append(moved(softness={CONTACTS: SOFTER[0]}))
+        columns.append(moved({"impratio": IMPRATIO * simulator.options.impratio}))
     return np.stack(columns, axis=-1)
 
 

@@ -5,26 +5,41 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import mujoco
+import numpy as np
+
+from compass_ros.types import Floats
 
 HELD = 0.999
 """Impedance (`solimp`) of friction that holds: at MuJoCo's 0.9 a joint creeps 111 times as fast, (1 - d) / d."""
 
 
-def set_numerics(model: mujoco.MjModel, options: Mapping[str, float], softness: Mapping[str, float]) -> None:
-    """Options into a model, and the regularisation of the dry friction of some joints, as a share of what it is.
+CONTACTS = "*"
+"""All contacts, among the names of joints."""
 
-    At a share of zero it holds: nearly rigid, and at rest within the shortest time that MuJoCo allows, two steps.
+
+def set_numerics(model: mujoco.MjModel, options: Mapping[str, float], softness: Mapping[str, float]) -> None:
+    """Options into a model, and the regularisation of some joints' dry friction, or of CONTACTS, as a share of what it
+    is.
+
+    At a share of zero friction holds: nearly rigid, and at rest within the shortest time that MuJoCo allows, two steps.
     Source: MuJoCo's documentation, Computation, R = (1 - d) / d times the inverse inertia.
     """
     for name, value in options.items():
         setattr(model.opt, name, value)
-    for joint, share in softness.items():
-        dof = model.joint(joint).dofadr[0]
-        impedance = float(model.dof_solimp[dof, 0])
-        model.dof_solimp[dof, 0] = 1 / (1 + share * (1 - impedance) / impedance) if share else HELD
+    for name, share in softness.items():
+        if name == CONTACTS:
+            for impedance in (model.geom_solimp[:, :2], model.pair_solimp[:, :2]):
+                impedance[:] = _harder(impedance, share)
+            continue
+        dof = model.joint(name).dofadr[0]
+        model.dof_solimp[dof, 0] = _harder(model.dof_solimp[dof, 0], share) if share else HELD
         if not share:
             model.dof_solimp[dof, 1] = HELD
             model.dof_solref[dof] = 2 * model.opt.timestep, 1.0
+
+
+def _harder(impedance: Floats, share: float) -> Floats:
+    return np.asarray(1 / (1 + share * (1 - impedance) / impedance))
 
 
 def creeping(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[str, ...]:
