@@ -126,7 +126,8 @@ def promising(ranked: Sequence[Ranked], parent: Hypothesis) -> list[Ranked]:
 def cold_starts(ranked: Sequence[Ranked], parent: Hypothesis) -> list[tuple[tuple[Attached, ...], Floats]]:
     """Each law that the parent lacks, on the sites that promise most, at a modest size.
 
-    One that promises nothing about a fit that is bent says nothing of its sites either: it starts on all of them.
+    One of contacts starts on all pairs: which of them it is on, a fit that is bent cannot say, for what a bounce
+    changes moves all that follows.
     """
     has = {a.effect.name for a in parent.laws}
     of: dict[str, list[Ranked]] = {}
@@ -136,7 +137,7 @@ def cold_starts(ranked: Sequence[Ranked], parent: Hypothesis) -> list[tuple[tupl
     out = []
     for same in of.values():
         pairs = [r for r in same if r.candidate.alone and r.candidate.attached.effect.paired]
-        chosen = pairs if same[0].gain <= 0 and pairs else same[:1]
+        chosen = pairs or same[:1]
         parts = tuple(part for r in chosen for part in r.candidate.parts)
         out.append((parts, np.concatenate([modest(r) for r in chosen])))
     return out

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from compass_ros.concealed.comparison import EXCESS
+from compass_ros.simulation.effects import EFFECTS
 from compass_ros.worlds.world import UNKNOWN
 
 Json = Mapping[str, Any]
@@ -101,9 +102,16 @@ def _right(names: Sequence[str], kind: str, laws: Sequence[Json]) -> bool:
 
 
 def _sites(found: Sequence[Json], law: Json) -> bool:
-    """Whether a law is on its sites; a law that has none of its own acts on all."""
-    said = {site for one in found for site in one["sites"]}
-    return not said or not law["sites"] or said == set(law["sites"])
+    """Whether a law is on its sites; a law that has none of its own acts on all.
+
+    A law between two things is on the one of them that the truth names: a plate, where the other is the ball.
+    """
+    own, said = set(law["sites"]), set[str]()
+    for one in found:
+        effect = EFFECTS.get(one["name"])
+        among = own & set(one["sites"]) if effect and effect.paired else set()
+        said |= among or set(one["sites"])
+    return not said or not own or said == own
 
 
 def _gain(explanation: Json) -> float | None:

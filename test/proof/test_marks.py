@@ -89,6 +89,18 @@ def test_the_site_is_judged_where_the_law_is_named(sites: tuple[str, ...], right
     assert judge(said, answer("one", LUGRE)).sites_right is right
 
 
+@pytest.mark.parametrize(
+    ("pairs", "right"),
+    [([("plate2", "ball")], True), ([("plate1", "ball")], False), ([("plate2", "ball"), ("plate1", "ball")], False)],
+)
+def test_a_law_between_two_things_is_on_the_one_that_is_true(pairs: list[tuple[str, ...]], right: bool) -> None:
+    said = result("named", explanation(1.0, *["adhesion"] * len(pairs)))
+    for law, sites in zip(said["mismatch"]["explanations"][0]["laws"], pairs, strict=True):
+        law["sites"] = list(sites)
+    sticky = {"name": "adhesion", "class": ["adhesion"], "sites": ["plate2"], "strength": 5.0}
+    assert judge(said, answer("one", sticky)).sites_right is right
+
+
 def test_what_the_laws_remove_is_counted_above_the_floor() -> None:
     assert judge(NAMED, answer("one", LUGRE)).gain == pytest.approx(0.9)
 
