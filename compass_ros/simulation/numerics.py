@@ -11,8 +11,6 @@ from compass_ros.types import Floats
 
 HELD = 0.999
 """Impedance (`solimp`) of friction that holds: at MuJoCo's 0.9 a joint creeps 111 times as fast, (1 - d) / d."""
-
-
 CONTACTS = "*"
 """All contacts, among the names of joints."""
 
@@ -39,7 +37,9 @@ def set_numerics(model: mujoco.MjModel, options: Mapping[str, float], softness: 
 
 
 def _harder(impedance: Floats, share: float) -> Floats:
-    return np.asarray(1 / (1 + share * (1 - impedance) / impedance))
+    """Impedances with which the regularisation is this share of what it is."""
+    within = np.clip(impedance, mujoco.mjMINIMP, mujoco.mjMAXIMP)
+    return np.asarray(1 / (1 + share * (1 - within) / within))
 
 
 def creeping(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[str, ...]:
