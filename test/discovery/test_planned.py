@@ -38,7 +38,7 @@ def test_perfect_recordings_leave_no_residual() -> None:
     response = linearised(simulator(), CALM[:1], 30.0, 1e-3)
     assert not response.tangent.residual.any()
     assert (response.likelihood.sigma >= 1e-3).all()
-    assert response.tangent.parameters.shape[2] == len(cell().parameters) + 1  # and the time step's
+    assert response.tangent.parameters.shape[2] == len(cell().parameters) + 3  # and the engine's nuisances
     assert (np.linalg.norm(response.tangent.parameters, axis=(0, 1)) > 0).sum() > 35
 
 
