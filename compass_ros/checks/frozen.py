@@ -31,7 +31,7 @@ RARE = 1e-3
 HELD = 0.2
 """Share of the samples of a motion that repeat the one before from which messages are too frequent."""
 FEWEST = 20
-"""Samples of a motion by which that is judged."""
+"""Samples of a motion, or values that change, by which that is judged."""
 WHITE = (0.6, 1.6)
 """Noise by sixth differences over that by fourth: one for white noise; a motion shows a tenth and less."""
 
@@ -83,7 +83,12 @@ def _runs(value: Floats) -> list[tuple[int, int]]:
 
 
 def _seldom_alike(values: Sequence[Floats]) -> bool:
-    """Whether rows of equal samples are long or none: a sensor that counts, or whose noise is small, has short ones."""
+    """Whether rows of equal samples are long or none: a sensor that counts, or whose noise is small, has short ones.
+
+    Of a few values that change, as of a joint that rests, nothing is known.
+    """
+    if sum(int(np.sum(~_same(value))) for value in values) < FEWEST:
+        return False
     short = 0
     for value in values:
         lengths = np.diff(np.append(np.flatnonzero(~_same(value)), len(value)))

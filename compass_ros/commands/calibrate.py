@@ -129,18 +129,28 @@ def run(
     reading = read_usable(cell, bags)
     make_writable(out)  # now, and not after minutes of work
 
+    written: list[Path] = []
+
     def write(result: Result, found: Discovery) -> Result:
         budget = replace(result.budget, wall_seconds=time.monotonic() - started)
         result = replace(result, budget=budget, left_out=(*reading.left_out, *result.left_out))
         write_all(result, found, cell, out, repeat)
+        written.append(out / "report.html")
         return result
 
-    with _shown(style) as report, _live(out, serve) as live:
-        steady = Steady(live.beside(report) if live else report)
-        result = write(*pipeline(reading.episodes, cell, validated, steady, write))
-        steady.end("written")
-        if live:
-            live.end()
+    try:
+        with _shown(style) as report, _live(out, serve) as live:
+            steady = Steady(live.beside(report) if live else report)
+            result = write(*pipeline(reading.episodes, cell, validated, steady, write))
+            steady.end("written")
+            if live:
+                live.end()
+    except KeyboardInterrupt:
+        left = f"the parameters are in {out}, missing physics was not looked for to the end" if written else (
+            "nothing was written: the parameters are, as soon as they are fitted"
+        )  # fmt: skip
+        typer.echo(f"stopped; {left}", err=True)
+        raise typer.Exit(130) from None
     if style is ProgressStyle.bar:
         print_result(result)
         for warning in (*result.left_out, *result.warnings):

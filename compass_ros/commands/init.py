@@ -19,11 +19,15 @@ def init(
     bags: Annotated[list[str], typer.Argument(help="bags, or folders of bags")],
     out: Annotated[Path, typer.Option(help="YAML of the cell")] = Path("cell.yaml"),
     links: Annotated[bool, typer.Option("--links", help="also tune mass, centre and inertia of each link")] = False,
+    force: Annotated[bool, typer.Option("--force", help="write over a YAML that is there")] = False,
 ) -> None:
     """Write a cell for a robot and its recordings: topics, joints, noise, windows and what to tune, with comments."""
     from compass_ros.cells import load
+    from compass_ros.errors import ConfigError
     from compass_ros.starter.cell import start
 
+    if out.exists() and not force:
+        raise ConfigError(f"{out}: is there already, and may have been edited; another --out, or --force")
     begun = time.monotonic()
     started = start(model, bags, out, links)
     cell = load(out)
@@ -33,7 +37,7 @@ def init(
         f"{' and '.join(str(file) for file in started.files)}: {len(cell.spec.inputs)} inputs, {len(cell.signals)} "
         f"signals, {len(cell.parameters)} parameters, in {time.monotonic() - begun:.1f} s"
     )
-    typer.echo(f"next: compass calibrate --cell {out} {named(bags)}")
+    typer.echo(f"next: compass check --cell {out} {named(bags)}, then compass calibrate likewise")
 
 
 def named(bags: Sequence[str]) -> str:

@@ -155,7 +155,7 @@ def _not_seen(result: Result) -> Iterator[Check]:
     grouped = {name for group in result.together for name in group.parameters}
     hidden = [r.name for r in result.parameters if not (r.active or r.identifiable or r.name in grouped)]
     if hidden:
-        text = f"{by_kind(hidden)}: hardly anything in these recordings depends on it. Values are as before."
+        text = f"{by_kind(hidden)}: hardly anything in these recordings depends on it. Its value says nothing."
         yield Check("note", f"{len(hidden)} parameters not seen", text)
 
 

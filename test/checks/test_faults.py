@@ -187,3 +187,5 @@ def test_real_servos_stick_and_slip_and_are_not_frozen(joint: int, expected: flo
     known = level(series, expected)
     found = (*unwrapped(series, known).findings, *interleaved(series, known), *frozen(series, known))
     assert (*found, *jumping_clock([replace(one, value=one.value / known.apart) for one in series])) == ()
+    alone = [finding for one in series for finding in frozen([one], level([one], expected))]
+    assert alone == [], "a joint that rests shows few values that change"

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -35,6 +37,10 @@ def test_a_newcomer_edits_nothing(tmp_path: Path) -> None:
     assert begun.returncode == 0, begun.stderr
     assert "1 inputs, 1 signals, 11 parameters" in begun.stdout
     assert "2 mesh files are not there" in begun.stderr
+    again = compass(tmp_path, "init", "arm.urdf", "bags", "--out", "cell.yaml")
+    assert again.returncode == 1
+    assert "cell.yaml: is there already" in again.stderr
+    assert compass(tmp_path, "init", "arm.urdf", "bags", "--out", "cell.yaml", "--force").returncode == 0
     done = compass(tmp_path, "calibrate", "--cell", "cell.yaml", "--no-discover", "--out", "out", "bags")
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "out" / "result.json").read_text())
@@ -49,6 +55,35 @@ def test_a_newcomer_edits_nothing(tmp_path: Path) -> None:
     gap = result["gap"]["calibrated"]["held_out"]["signals"]["joints"]
     assert gap["rms"] < 1.2 * max(gap["floor"], 0.0005)
     assert math.isfinite(gap["rms"])
+    fitted = min(name.split(" at ")[0] for name in result["episodes"]["used"])
+    judged = compass(tmp_path, "evaluate", "out", f"bags/{fitted}")
+    assert judged.returncode == 0, judged.stderr
+    assert f"{fitted}: fitted, so this is no test" in judged.stderr
+
+    stopped = interrupted(tmp_path, "calibrate", "--cell", "cell.yaml", "--progress", "json", "--out", "out2", "bags")
+    assert stopped.returncode == 130
+    assert stopped.stderr.splitlines()[-1].startswith("stopped; nothing was written")
+
+
+def interrupted(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """Ctrl-C at the first line on standard output."""
+    command = [sys.executable, "-m", "compass_ros.cli", *words]
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # who runs the tests in the background ignores it
+    with subprocess.Popen(
+        command,
+        cwd=folder,
+        env=environment,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        preexec_fn=heard,  # noqa: PLW1509 - nothing else runs here
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    return subprocess.CompletedProcess(command, process.returncode, out, err)
 
 
 def test_what_is_wrong_is_one_line(tmp_path: Path) -> None:

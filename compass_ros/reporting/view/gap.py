@@ -72,7 +72,7 @@ def _times(ratio: float) -> str:
 
 
 def factor_table(result: Result) -> list[dict[str, Any]]:
-    """Mean trajectory difference by factor on held-out (and fitted) episodes [m]."""
+    """Mean trajectory difference by factor on held-out (and fitted) episodes [m or rad]."""
     rows = []
     for factor in result.graph.factors:
         cells = []
