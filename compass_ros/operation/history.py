@@ -11,7 +11,9 @@ from typing import Any, Literal
 import numpy as np
 
 from compass_ros.operation.several import Number, Run, explanations, mean, signals, table_of
+from compass_ros.reporting.checks import NEAR_FLOOR
 from compass_ros.reporting.numbers import plain, unit_text, with_error
+from compass_ros.reporting.words import held_out_rmse
 from compass_ros.types import WRONG
 
 SCHEMA_ID = "compass/history/1"
@@ -115,8 +117,15 @@ def _drift(name: str, labels: Sequence[str], said: Sequence[Number], order: dict
 
 
 def _notes(runs: Sequence[Run]) -> tuple[str, ...]:
-    """What moved that is no number: the first explanation, the cell's defaults, versions of what computes."""
+    """What moved that is no number: the first explanation, the cell's defaults, versions of what computes. And which
+    runs miss their recordings by so much that error bars, which hold noise alone, cannot carry a comparison."""
     said = []
+    far = [one.label for one in runs if held_out_rmse(one.result, "calibrated") > NEAR_FLOOR * one.result.noise_floor_m]
+    if far:
+        said.append(
+            f"{', '.join(far)}: far above the noise floor, and error bars hold noise alone: what moved there may be "
+            "the recordings and not the robot"
+        )
     for before, after in pairwise(runs):
         one, other = ({r.name: r.default for r in run.result.parameters} for run in (before, after))
         changed = [name for name in one if name in other and one[name] != other[name]]

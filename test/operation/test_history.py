@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from compass_ros.operation.history import history
 from compass_ros.operation.several import Number, Run, mean, read_runs
 from compass_ros.operation.sheets import history_sheet
 from compass_ros.reporting.sheet import write_sheet
+from compass_ros.types import Gap
 from test.conftest import Run as Command
 from test.operation.many_results import WITH_PLAY, drawn, result, weeks, write
 
@@ -34,6 +36,16 @@ def test_a_planted_step_is_found_in_its_week_and_play_is_said(tmp_path: Path) ->
         "2026-w07: the most probable explanation is no longer 'nothing is missing' but 'backlash on elbow'",
     )
     assert set(found.table["backlash on elbow: width"]) == {"2026-w07", "2026-w08"}
+
+
+def test_runs_far_above_their_floor_are_named() -> None:
+    good, bad = runs_of({"hand@dyna@mass": [0.3, 0.4]})
+    missed = Gap({"elbow": 0.1}, 0.034)
+    bad = replace(
+        bad, result=replace(bad.result, gap={"nominal": bad.result.gap["nominal"], "calibrated": {"held_out": missed}})
+    )
+    (note,) = history([good, bad]).notes
+    assert note.startswith("w2: far above the noise floor")
 
 
 def test_a_slow_drift_without_a_step_is_found() -> None:
