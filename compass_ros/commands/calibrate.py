@@ -53,7 +53,12 @@ def calibrate(
         Parameters, typer.Option(help="what is tuned: the cell's own list, or every tunable field of its scene too")
     ] = Parameters.cell,
     seed: Annotated[int, typer.Option(min=0, help="decides which episodes are held out, and all random numbers")] = 0,
-    rollouts: Annotated[int, typer.Option(min=0, help="most simulated rollouts; 0: the method's own budget")] = 0,
+    rollouts: Annotated[
+        int,
+        typer.Option(
+            min=0, help="most simulated rollouts of a method with a budget of them (`default` has none); 0: its own"
+        ),
+    ] = 0,
     held_out: Annotated[float, typer.Option(min=0, max=0.9, help="share of the episodes that is never fitted")] = 0.25,
     episodes: Annotated[int, typer.Option(min=1, help="most episodes to use; of more, an even choice")] = 100,
     config: Annotated[Path | None, typer.Option(help="YAML with any field of the configuration")] = None,
