@@ -6,23 +6,25 @@ import math
 from types import TracebackType
 
 from rich.console import Console
-from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as RichProgress
 
 from compass_ros.types import Progress
 
 
 class Bar:
-    """A `types.Report` that draws a bar on standard error while its context is open; nothing where that is a file."""
+    """A `types.Report` that draws a bar on standard error while its context is open; where that is a file, it writes a
+    line at the beginning of each stage."""
 
     def __init__(self) -> None:
-        console = Console(stderr=True)
+        self._console = console = Console(stderr=True)
+        self._stage = ""
         self._bar = RichProgress(
             TextColumn("{task.description}"),
             BarColumn(),
             TaskProgressColumn(),
             TextColumn("{task.fields[gap]}"),
-            TimeRemainingColumn(),
+            TimeElapsedColumn(),
             console=console,
             transient=True,
             disable=not console.is_terminal,
@@ -40,5 +42,8 @@ class Bar:
 
     def __call__(self, progress: Progress) -> bool:
         gap = f"gap {progress.gap:.3f}" if math.isfinite(progress.gap) else ""
+        if not self._console.is_terminal and progress.stage != self._stage:
+            self._console.print(f"{progress.stage}, {100 * progress.done:.0f} % done")
+        self._stage = progress.stage
         self._bar.update(self._task, completed=progress.done, description=progress.stage, gap=gap)
         return True

@@ -43,6 +43,8 @@ def test_a_newcomer_edits_nothing(tmp_path: Path) -> None:
     assert compass(tmp_path, "init", "arm.urdf", "bags", "--out", "cell.yaml", "--force").returncode == 0
     done = compass(tmp_path, "calibrate", "--cell", "cell.yaml", "--no-discover", "--out", "out", "bags")
     assert done.returncode == 0, done.stderr
+    stages = [line.split(",")[0] for line in done.stderr.splitlines() if line.endswith("% done")]
+    assert stages == ["screen", "refine", "written"]
     result = json.loads((tmp_path / "out" / "result.json").read_text())
     found = {row["name"]: row for row in result["parameters"]}
     for name, true in (
