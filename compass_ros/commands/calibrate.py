@@ -165,7 +165,7 @@ def run(
 
 def _shown(style: ProgressStyle) -> AbstractContextManager[Bar | _JsonLines | _Quiet]:
     if style is ProgressStyle.bar:
-        return Bar()
+        return Bar(log=True)
     return nullcontext(_JsonLines() if style is ProgressStyle.json else _Quiet())
 
 

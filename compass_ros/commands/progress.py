@@ -13,10 +13,12 @@ from compass_ros.types import Progress
 
 
 class Bar:
-    """A `types.Report` that draws a bar on standard error while its context is open; where that is a file, it writes a
-    line at the beginning of each stage."""
+    """A `types.Report` that draws a bar on standard error while its context is open; where that is a file,
+    nothing, or a line at the beginning of each stage."""
 
-    def __init__(self) -> None:
+    def __init__(self, log: bool = False) -> None:
+        """`log`: write these lines."""
+        self._log = log
         self._console = console = Console(stderr=True)
         self._stage = ""
         self._bar = RichProgress(
@@ -42,7 +44,7 @@ class Bar:
 
     def __call__(self, progress: Progress) -> bool:
         gap = f"gap {progress.gap:.3f}" if math.isfinite(progress.gap) else ""
-        if not self._console.is_terminal and progress.stage != self._stage:
+        if self._log and not self._console.is_terminal and progress.stage != self._stage:
             self._console.print(f"{progress.stage}, {100 * progress.done:.0f} % done")
         self._stage = progress.stage
         self._bar.update(self._task, completed=progress.done, description=progress.stage, gap=gap)
