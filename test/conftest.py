@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -20,6 +21,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     Those that need ROS are not run in parallel, and keep their order: the tests of a folder share a DDS domain.
     """
     items.sort(key=lambda item: not item.get_closest_marker("slow") or bool(item.get_closest_marker("ros")))
+
+
+@pytest.fixture
+def hear_ctrl_c() -> Iterator[None]:
+    """Who runs the tests in the background has them, and so their children, ignore SIGINT."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture

@@ -66,12 +66,9 @@ class Demo:
 
 
 @pytest.fixture
-def started(tmp_path: Path) -> Iterator[list[Demo]]:
-    # Who runs the tests in the background has them, and so their children, ignore SIGINT.
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+def started(tmp_path: Path, hear_ctrl_c: None) -> Iterator[list[Demo]]:
     demos: list[Demo] = []
     yield demos
-    signal.signal(signal.SIGINT, before)
     for demo in demos:
         if demo.process.poll() is None:
             os.killpg(demo.process.pid, signal.SIGINT)

@@ -134,13 +134,14 @@ def run(
     reading = read_usable(cell, bags)
     make_writable(out)  # now, and not after minutes of work
 
-    written: list[Path] = []
+    written = False
 
     def write(result: Result, found: Discovery) -> Result:
+        nonlocal written
         budget = replace(result.budget, wall_seconds=time.monotonic() - started)
         result = replace(result, budget=budget, left_out=(*reading.left_out, *result.left_out))
         write_all(result, found, cell, out, repeat)
-        written.append(out / "report.html")
+        written = True
         return result
 
     try:
@@ -151,10 +152,9 @@ def run(
             if live:
                 live.end()
     except KeyboardInterrupt:
-        left = f"the parameters are in {out}, missing physics was not looked for to the end" if written else (
-            "nothing was written: the parameters are, as soon as they are fitted"
-        )  # fmt: skip
-        typer.echo(f"stopped; {left}", err=True)
+        there = f"the parameters are in {out}, missing physics was not looked for to the end"
+        nothing = "nothing was written: the parameters are, as soon as they are fitted"
+        typer.echo(f"stopped; {there if written else nothing}", err=True)
         raise typer.Exit(130) from None
     if style is ProgressStyle.bar:
         print_result(result)

@@ -39,8 +39,8 @@ def evaluate(
     left_out = (*reading.left_out, *said.left_out)
     listed = {"left_out": [asdict(one) for one in left_out]}
     typer.echo(json.dumps(to_json(said) | listed, indent=1)) if as_json else show(said)
-    fitted = {name.split(" at ")[0] for name in content["episodes"].get("used", content["episodes"]["fit"])}
-    if seen := [name for name in said.recordings if name in fitted]:
+    fitted = content["episodes"]["fit"]  # recordings, or windows of them
+    if seen := [r for r in said.recordings if any(name == r or name.startswith(f"{r} at ") for name in fitted)]:
         typer.echo(f"note: {', '.join(seen)}: fitted, so this is no test of the result", err=True)
     for one in left_out:
         typer.echo(f"note: {one}", err=True)

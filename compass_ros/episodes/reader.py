@@ -205,7 +205,7 @@ def _episode(path: Path, content: _Content, cell: str, cell_hash: Hashes) -> Epi
     streams = content.streams()
     head = content.headers[0] if content.headers else EpisodeHeader("finished", bag_name(path))
     if cell and head.cell and head.cell != cell:
-        raise BagError(f"recorded in another cell: expected '{cell}', found '{head.cell}'; --cell names its own")
+        raise BagError(f"recorded in another cell: expected '{cell}', found '{head.cell}'; name its own cell")
     known = (cell_hash,) if isinstance(cell_hash, str) else cell_hash
     if known[0] and head.cell_hash and head.cell_hash not in known:
         raise BagError(

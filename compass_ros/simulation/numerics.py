@@ -30,9 +30,10 @@ def set_numerics(model: mujoco.MjModel, options: Mapping[str, float], softness: 
                 impedance[:] = _harder(impedance, share)
             continue
         dof = model.joint(name).dofadr[0]
-        model.dof_solimp[dof, 0] = _harder(model.dof_solimp[dof, 0], share) if share else HELD
-        if not share:
-            model.dof_solimp[dof, 1] = HELD
+        if share:
+            model.dof_solimp[dof, 0] = _harder(model.dof_solimp[dof, 0], share)
+        else:
+            model.dof_solimp[dof, :2] = HELD
             model.dof_solref[dof] = 2 * model.opt.timestep, 1.0
 
 

@@ -65,7 +65,7 @@ class Simulator:
         options: Mapping[str, float] | None = None, softness: Mapping[str, float] | None = None,
     ) -> None:  # fmt: skip
         """`options`: MuJoCo's numerics (`timestep`, `cone`, `solver`, ...) where they are not to be the scene's.
-        `softness`: what is left of the regularisation of joints' dry friction, as a share (`set_numerics`)."""
+        `softness`: what is left of the regularisation of joints' dry friction, or of contacts (`set_numerics`)."""
         self._numerics = partial(set_numerics, options=options or {}, softness=softness or {})
         dynamics = dynamics_of(cell)
         self._numerics(dynamics.model)

@@ -8,7 +8,6 @@ import os
 import signal
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -16,17 +15,19 @@ import pytest
 from compass_ros.commands.init import named
 from test.starter.recorded import URDF, moved, record, stamps, state
 
+# By the module, so that the sources of this checkout run.
+COMPASS = (sys.executable, "-m", "compass_ros.cli")
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+
 
 def compass(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    # By the module, so that the sources of this checkout run.
-    command = [sys.executable, "-m", "compass_ros.cli", *words]
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+    command = [*COMPASS, *words]
     return subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=300
+        command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=False, timeout=300
     )
 
 
-def test_a_newcomer_edits_nothing(tmp_path: Path) -> None:
+def test_a_newcomer_edits_nothing(tmp_path: Path, hear_ctrl_c: None) -> None:
     (tmp_path / "arm.urdf").write_text(URDF.format("panda_joint1", "panda_joint2"))
     for seed in range(3):
         time, target, got = moved(seed, 5.0, 0.02)
@@ -69,18 +70,8 @@ def test_a_newcomer_edits_nothing(tmp_path: Path) -> None:
 
 def interrupted(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     """Ctrl-C at the first line on standard output."""
-    command = [sys.executable, "-m", "compass_ros.cli", *words]
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
-    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # who runs the tests in the background ignores it
-    with subprocess.Popen(
-        command,
-        cwd=folder,
-        env=environment,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        preexec_fn=heard,  # noqa: PLW1509 - nothing else runs here
-    ) as process:
+    command, pipe = [*COMPASS, *words], subprocess.PIPE
+    with subprocess.Popen(command, cwd=folder, env=ENVIRONMENT, text=True, stdout=pipe, stderr=pipe) as process:
         assert process.stdout is not None
         process.stdout.readline()
         process.send_signal(signal.SIGINT)
