@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import json
 from collections.abc import Collection, Iterable, Mapping
@@ -84,14 +85,29 @@ def write(path: Path, lines: Iterable[Line]) -> None:
 
 
 def sources(parts: Iterable[str]) -> str:
-    """Hash of the source files of these parts of the package: 16 hexadecimal digits."""
+    """Hash of what the source files of these parts of the package do: 16 hexadecimal digits.
+
+    Of Python its syntax tree without docstrings, so that neither a comment nor a word of them makes a line stale.
+    """
     total = hashlib.sha256()
     for part in parts:
         root = PACKAGE / part
         files = [root] if root.is_file() else sorted(p for p in root.rglob("*") if p.suffix in (".py", ".c"))
         for file in files:
-            total.update(str(file.relative_to(PACKAGE)).encode() + b"\0" + file.read_bytes())
+            content = _tree(file.read_text(encoding="utf-8")) if file.suffix == ".py" else file.read_bytes()
+            total.update(str(file.relative_to(PACKAGE)).encode() + b"\0" + content)
     return total.hexdigest()[:16]
+
+
+def _tree(text: str) -> bytes:
+    """The syntax tree of a module without strings that stand alone."""
+
+    class Bare(ast.NodeTransformer):
+        def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
+            is_text = isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+            return None if is_text else node
+
+    return ast.dump(Bare().visit(ast.parse(text))).encode()
 
 
 def stale(line: Line | None, method_sources: str, world_sources: str) -> bool:
