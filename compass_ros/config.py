@@ -27,10 +27,10 @@ class CompassConfig:
     n_cmd_action: int = Field(default=10, ge=1, description="real rollouts N used in an iteration")
     n_sim: int = Field(default=64, ge=2, description="simulated rollouts M for each real one")
     n_epochs: int = Field(default=4000, ge=1, description="passes over the data of one iteration")
-    batch_size: int = Field(default=64, ge=2)
-    learning_rate: float = Field(default=1e-3, gt=0)
+    batch_size: int = Field(default=64, ge=2, description="rollouts of one gradient step")
+    learning_rate: float = Field(default=1e-3, gt=0, description="of Adam")
     emb_dim: int = Field(default=32, ge=1, description="width of the encoder of one parameter")
-    hidden_dim: tuple[int, ...] = (256, 256)
+    hidden_dim: tuple[int, ...] = Field(default=(256, 256), description="widths of the decoder's layers")
     causal_dim: int = Field(default=32, ge=1, description="features d_z that pass through the graph")
     sparse_weight: float = Field(default=0.003, ge=0, description="lambda of loss (2)")
     sw_discount: float = Field(default=0.5, gt=0, le=1, description="factor on lambda from one iteration to the next")
@@ -69,11 +69,11 @@ class CompassConfig:
 class CalibrationConfig:
     """What `compass calibrate` does; everything but the recordings and the cell."""
 
-    method: str = "default"
+    method: str = Field(default="default", description="default, compass, or a rival")
     parameters: Parameters = Field(
         default="cell", description="what is tuned: the cell's list, or auto: every tunable field of the scene too"
     )
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, description="of the held-out episodes and of all random numbers")
     rollouts: int = Field(
         default=0, ge=0, description="most simulated rollouts of the method; 0 = what it takes by default"
     )
@@ -95,7 +95,7 @@ class CalibrationConfig:
         description="most windows of long recordings that are fitted; of more, those that are most unlike each other",
     )
     threads: int = Field(default=0, ge=0, description="threads for rollouts; 0: all cores. Results do not depend on it")
-    compass: CompassConfig = Field(default_factory=CompassConfig)
+    compass: CompassConfig = Field(default_factory=CompassConfig, description="of the method `compass`, fields below")
 
 
 def read_yaml(path: Path) -> Mapping[str, object]:

@@ -8,16 +8,29 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from pydantic_core import PydanticUndefined
 from typer.main import get_command
 
 from compass_ros.cli import app
+from compass_ros.config import CalibrationConfig, CompassConfig
 
 PAGE = Path(__file__).parents[1] / "docs" / "cli.md"
 HEAD = """# Command line
 
 Every command of `compass`, as `compass COMMAND --help` says it (`python scripts/cli_reference.py` writes this page).
 Exit status 0: done; 1: the input is bad, and one line on standard error says which file, what was expected and what was
-found; 2: wrong use.
+found; 2: wrong use. The fields of `calibrate --config` stand at [the end](#settings).
+
+"""
+SETTINGS = """
+## Settings
+
+`compass calibrate --config SETTINGS.yaml` takes any of these; what the file says counts, and not the command line. A name that is
+not among them is refused, with the nearest one that is.
+
+    episodes: 24
+    windows: 12
+    compass: {n_round: 5}
 
 """
 
@@ -27,7 +40,17 @@ def page() -> str:
     commands: dict[str, Any] = get_command(app).commands  # type: ignore[attr-defined]
     shown = {name: command for name, command in commands.items() if not command.hidden}
     rows = [f"| [`{name}`](#{name}) | {_first_line(command)} |" for name, command in shown.items()]
-    return HEAD + "\n".join(["| command | |", "|---|---|", *rows]) + "\n\n" + "\n".join(map(_section, shown.values()))
+    listed = "\n".join(["| command | |", "|---|---|", *rows]) + "\n\n" + "\n".join(map(_section, shown.values()))
+    return HEAD + listed + SETTINGS + _settings(CalibrationConfig, "") + _settings(CompassConfig, "compass.")
+
+
+def _settings(of: type, before: str) -> str:
+    """A table of the fields of a configuration."""
+    rows = []
+    for name, field in of.__pydantic_fields__.items():  # type: ignore[attr-defined]
+        default = "" if field.default is PydanticUndefined else f"`{field.default}`".replace("True", "true")
+        rows.append(f"| `{before}{name}` | {_cell(field.description)} | {default} |")
+    return "\n".join(["| | | default |", "|---|---|---|", *rows, ""]) + "\n"
 
 
 def _first_line(command: Any) -> str:

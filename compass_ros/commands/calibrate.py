@@ -6,6 +6,7 @@ import json
 import math
 import os
 import shlex
+import signal
 import sys
 import time
 from collections.abc import Iterator, Mapping
@@ -61,7 +62,7 @@ def calibrate(
     ] = 0,
     held_out: Annotated[float, typer.Option(min=0, max=0.9, help="share of the episodes that is never fitted")] = 0.25,
     episodes: Annotated[int, typer.Option(min=1, help="most episodes to use; of more, an even choice")] = 100,
-    config: Annotated[Path | None, typer.Option(help="YAML with any field of the configuration")] = None,
+    config: Annotated[Path | None, typer.Option(help="YAML with any of the settings of docs/cli.md")] = None,
     discover: Annotated[bool, typer.Option(help="look for missing physics after the calibration")] = True,
     false_alarm: Annotated[
         float, typer.Option(help="probability of naming something, or `unknown`, where nothing is missing")
@@ -74,6 +75,7 @@ def calibrate(
     repeat: Annotated[str, typer.Option(hidden=True, help="the command that the report gives; empty: this one")] = "",
 ) -> None:
     """Find which simulator parameters are wrong, what they should be, and what physics is missing."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a scheduler's end says what is there, as Ctrl-C does
     given = settings(method, seed, rollouts, held_out, episodes, discover, config, parameters, false_alarm)
     run(bags, cell, out, given, progress, repeat or shlex.join(["compass", *sys.argv[1:]]), serve)
 

@@ -63,18 +63,20 @@ def test_a_newcomer_edits_nothing(tmp_path: Path, hear_ctrl_c: None) -> None:
     assert judged.returncode == 0, judged.stderr
     assert f"{fitted}: fitted, so this is no test" in judged.stderr
 
-    stopped = interrupted(tmp_path, "calibrate", "--cell", "cell.yaml", "--progress", "json", "--out", "out2", "bags")
-    assert stopped.returncode == 130
-    assert stopped.stderr.splitlines()[-1].startswith("stopped; nothing was written")
+    words = ("calibrate", "--cell", "cell.yaml", "--progress", "json", "--out", "out2", "bags")
+    for by in (signal.SIGINT, signal.SIGTERM):
+        stopped = interrupted(tmp_path, by, *words)
+        assert stopped.returncode == 130
+        assert stopped.stderr.splitlines()[-1].startswith("stopped; nothing was written")
 
 
-def interrupted(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    """Ctrl-C at the first line on standard output."""
+def interrupted(folder: Path, by: signal.Signals, *words: str) -> subprocess.CompletedProcess[str]:
+    """Ended from outside at the first line on standard output."""
     command, pipe = [*COMPASS, *words], subprocess.PIPE
     with subprocess.Popen(command, cwd=folder, env=ENVIRONMENT, text=True, stdout=pipe, stderr=pipe) as process:
         assert process.stdout is not None
         process.stdout.readline()
-        process.send_signal(signal.SIGINT)
+        process.send_signal(by)
         out, err = process.communicate(timeout=60)
     return subprocess.CompletedProcess(command, process.returncode, out, err)
 
