@@ -24,6 +24,7 @@ def add_rotors(spec: mujoco.MjSpec, joints: Sequence[str]) -> None:
         body.mass, body.inertia, body.explicitinertial = _DUST_KG, [_DUST_KG_M2] * 3, True
         rotor = body.add_joint(name=f"{PREFIX}{name}", type=joint.type, axis=[0, 0, 1])
         rotor.actfrclimited, rotor.actfrcrange = joint.actfrclimited, joint.actfrcrange
+        rotor.solref_friction, rotor.solimp_friction = joint.solref_friction, joint.solimp_friction
         tendon = spec.add_tendon(name=f"{PREFIX}{name}")
         tendon.springlength = [0.0, 0.0]
         tendon.wrap_joint(rotor.name, 1.0)

@@ -15,10 +15,11 @@ from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.fits import finished, without
-from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.hypothesis import Hypothesis, name_of
 from compass_ros.discovery.neighbours import SLIGHT, exchange, rank, widen
 from compass_ros.discovery.odds import Known, Prior
 from compass_ros.discovery.settings import PRIOR_UNKNOWN, RHO, RHO_PRIOR
+from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
 
 DEEPEST = 3
@@ -92,17 +93,27 @@ def finish(known: Known, others: Sequence[float]) -> None:
     be apart, or a discrepancy may stand for; and first order is what it says about an optimum alone. A model with a law
     that is within its error bars of zero, as the noise leaves them or as the episodes disagree on it
     (`Hypothesis.weakest`), is the model without that law, and stands for it: laws go one by one, since each is unsure
-    beside another that does nearly the same. `others`: log odds of models without a law.
+    beside another that does nearly the same. Before its last steps one goes only where that is as probable. `others`:
+    log odds of models without a law.
     """
     while (name := _unfinished(known, others)) is not None:
-        model = finished(known.models.pop(name)[0])
+        begun, odds = known.models.pop(name)
         known.finished.add(name)
+        if len(begun.laws) > 1 and (weakest := begun.weakest) and _less(known, begun, weakest) >= odds:
+            continue  # its optimum is not worth the search for it
+        model = finished(begun)
         if (weakest := model.weakest) is None:
             known.models[name] = model, known.odds(model, model.log_evidence)
         elif len(model.laws) > 1:
-            less = without(model, [weakest])
-            if less.name not in known.models:
-                known.take([less])
+            _less(known, model, weakest)
+
+
+def _less(known: Known, model: Hypothesis, law: Attached) -> float:
+    """Log odds of a model without one of its laws, fitted if it is not known; -inf: another one is zero there."""
+    name = name_of([a for a in model.laws if a is not law])
+    if name not in known.models:
+        known.take([without(model, [law])])
+    return known.models[name][1] if name in known.models else -np.inf
 
 
 def _unfinished(known: Known, others: Sequence[float]) -> str | None:

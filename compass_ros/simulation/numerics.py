@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import mujoco
 import numpy as np
 
+from compass_ros.cells.rotors import PREFIX
 from compass_ros.types import Floats
 
 HELD = 0.999
@@ -29,12 +30,18 @@ def set_numerics(model: mujoco.MjModel, options: Mapping[str, float], softness: 
             for impedance in (model.geom_solimp[:, :2], model.pair_solimp[:, :2]):
                 impedance[:] = _harder(impedance, share)
             continue
-        dof = model.joint(name).dofadr[0]
-        if share:
-            model.dof_solimp[dof, 0] = _harder(model.dof_solimp[dof, 0], share)
-        else:
-            model.dof_solimp[dof, :2] = HELD
-            model.dof_solref[dof] = 2 * model.opt.timestep, 1.0
+        for dof in _dofs(model, name):
+            if share:
+                model.dof_solimp[dof, 0] = _harder(model.dof_solimp[dof, 0], share)
+            else:
+                model.dof_solimp[dof, :2] = HELD
+                model.dof_solref[dof] = 2 * model.opt.timestep, 1.0
+
+
+def _dofs(model: mujoco.MjModel, joint: str) -> list[int]:
+    """Of a joint, and of its rotor where it has one: friction may be on either."""
+    ids = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in (joint, f"{PREFIX}{joint}")]
+    return [int(model.jnt_dofadr[i]) for i in ids if i >= 0]
 
 
 def _harder(impedance: Floats, share: float) -> Floats:

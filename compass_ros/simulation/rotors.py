@@ -9,11 +9,11 @@ from compass_ros.errors import ConfigError
 from compass_ros.simulation.sites import OF_JOINT, Site
 
 
-def onto_rotor(model: mujoco.MjModel, joint: str, inertia: float) -> int:
+def onto_rotor(model: mujoco.MjModel, joint: str, inertia: float, share: float) -> int:
     """Let what drives a joint, and what measures its effort, act on its rotor of that inertia. Returns the tendon.
 
-    The joint's armature, which stood for the rotor, is smaller by that. A second call sets the inertia anew. Raises
-    ConfigError where the scene has no such rotor.
+    The joint's armature, which stood for the rotor, is smaller by that, and `share` of its damping and dry friction
+    is the rotor's. A second call sets them anew. Raises ConfigError where the scene has no such rotor.
     """
     tendon = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, f"{PREFIX}{joint}"))
     if tendon < 0:
@@ -26,6 +26,9 @@ def onto_rotor(model: mujoco.MjModel, joint: str, inertia: float) -> int:
     whole = model.dof_armature[one] + model.dof_armature[other]
     model.dof_armature[other] = inertia
     model.dof_armature[one] = max(whole - inertia, 0.0)
+    for lost in (model.dof_damping, model.dof_frictionloss):
+        whole = lost[one] + lost[other]
+        lost[one], lost[other] = (1 - share) * whole, share * whole
     return tendon
 
 

@@ -222,7 +222,9 @@ def _between(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
         _set_first(tendon, "stiffness", float(model.tendon_stiffness[t]))
         _set_first(tendon, "damping", float(model.tendon_damping[t]))
         for side in (name, f"{PREFIX}{name}"):
-            spec.joint(side).armature = float(model.dof_armature[model.joint(side).dofadr[0]])
+            joint, dof = spec.joint(side), int(model.joint(side).dofadr[0])
+            joint.armature, joint.frictionloss = float(model.dof_armature[dof]), float(model.dof_frictionloss[dof])
+            _set_first(joint, "damping", float(model.dof_damping[dof]))
     for a in np.flatnonzero(model.actuator_trnid[:, 0] != drives):
         spec.actuators[a].target = model.joint(int(model.actuator_trnid[a, 0])).name
     for s in np.flatnonzero(model.sensor_objid != efforts):

@@ -140,9 +140,11 @@ def test_what_mjcf_has_no_word_for_is_left_out_and_said(scene: Path, tmp_path: P
     assert (swing(tmp_path / "plain.xml", np.zeros((9, 2))) == swing(scene, np.zeros((9, 2)))).all()
 
 
-@pytest.mark.parametrize(("name", "numbers"), [("backlash", (0.05, 0.02)), ("joint_elasticity", (0.004, 0.02))])
+@pytest.mark.parametrize(
+    ("name", "numbers"), [("backlash", (0.05, 0.02, 0.7)), ("joint_elasticity", (0.004, 0.02, 0.7))]
+)
 def test_what_is_between_a_motor_and_its_joint_is_plain_mjcf(
-    name: str, numbers: tuple[float, float], tmp_path: Path
+    name: str, numbers: tuple[float, ...], tmp_path: Path
 ) -> None:
     spec = mujoco.MjSpec.from_string(SCENE)
     spec.joint("shoulder").armature = 0.05
@@ -158,5 +160,7 @@ def test_what_is_between_a_motor_and_its_joint_is_plain_mjcf(
 
 
 def test_without_a_motor_s_side_play_is_left_out(scene: Path, tmp_path: Path) -> None:
-    (said,) = write_plain(scene, exported(fitted("backlash", ("shoulder",), (0.05, 0.02))), (), tmp_path / "plain.xml")
+    (said,) = write_plain(
+        scene, exported(fitted("backlash", ("shoulder",), (0.05, 0.02, 0.7))), (), tmp_path / "plain.xml"
+    )
     assert said.fate == "left out"

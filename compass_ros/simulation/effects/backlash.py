@@ -2,7 +2,8 @@
 
 tau = 0 while |theta - q| < play / 2, and beyond whatever keeps it from being more, without bouncing; theta the motor's
 angle behind the gear, rotor theta'' = drive - tau. Zero play is absent: motor and joint are one. `rotor` is a part of
-the joint's armature, as far as it has one. An episode begins in the middle of the play.
+the joint's armature, as far as it has one, and `share` of its damping and dry friction is the motor's. An episode
+begins in the middle of the play.
 Source: Nordin and Gutman 2002, dead-zone model with stiff flanks. In MuJoCo: a second joint, and a tendon with limits
 between them; with an elasticity beside it, a spring with a dead band.
 """
@@ -23,11 +24,11 @@ _STIFF_STEPS = 2.0
 
 
 def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
-    play, rotor = numbers
+    play, rotor, share = numbers
     if play <= 0:
         return
     for site in context.sites:
-        tendon = onto_rotor(model, site.name, rotor)
+        tendon = onto_rotor(model, site.name, rotor, share)
         model.tendon_lengthspring[tendon] = model.tendon_range[tendon] = (-0.5 * play, 0.5 * play)
         model.tendon_solref_lim[tendon] = (_STIFF_STEPS * model.opt.timestep, 1.0)
         model.tendon_limited[tendon] = model.tendon_stiffness[tendon] == 0
@@ -35,7 +36,7 @@ def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
 
 def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
     play = Quantity("play", size.length_unit, 0.0, LARGEST * size.spread, MODEST * size.spread)
-    return (play, rotor_of(size))
+    return (play, *rotor_of(size))
 
 
 EFFECT = Effect(

@@ -2,7 +2,8 @@
 
 tau = (theta - q) / compliance + damping (theta' - q') on the joint and its opposite on the motor, theta the motor's
 angle behind the gear, rotor theta'' = drive - tau; damping = 2 x 0.05 sqrt(rotor / compliance). Zero compliance is
-absent: motor and joint are one. `rotor` is a part of the joint's armature, as far as it has one.
+absent: motor and joint are one. `rotor` is a part of the joint's armature, as far as it has one; `share` of the joint's
+damping and dry friction is the motor's.
 Source: Spong 1987, flexible-joint robots; 0.05 of critical damping is usual in geared and belt drives (Albu-Schaeffer,
 Ott and Hirzinger 2007). In MuJoCo: a second joint, and a tendon with stiffness between them.
 """
@@ -27,11 +28,11 @@ rotor, and less for what is softer."""
 
 
 def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
-    compliance, rotor = numbers
+    compliance, rotor, share = numbers
     if compliance <= 0:
         return
     for site in context.sites:
-        tendon = onto_rotor(model, site.name, rotor)
+        tendon = onto_rotor(model, site.name, rotor, share)
         stiffness = min(1 / compliance, rotor * (_SOFTEST / model.opt.timestep) ** 2)
         model.tendon_stiffness[tendon] = stiffness
         model.tendon_damping[tendon] = 2 * _DAMPING_RATIO * np.sqrt(rotor * stiffness)
@@ -43,15 +44,18 @@ def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
     most = size.spread / size.force
     return (
         Quantity("compliance", f"{size.length_unit}/{size.force_unit}", 0.0, LARGEST * most, MODEST * most),
-        rotor_of(size),
+        *rotor_of(size),
     )
 
 
-def rotor_of(size: JointSize) -> Quantity:
-    """The motor's inertia behind its gear: most drives are built so that it is like that of what they move."""
+def rotor_of(size: JointSize) -> tuple[Quantity, Quantity]:
+    """The motor's inertia behind its gear: most drives are built so that it is like that of what they move. And how
+    much of the joint's damping and dry friction is the motor's: most of it, of a geared drive (Nordin and Gutman 2002
+    have some on either side)."""
     unit = "kg m^2" if size.kind == "hinge" else "kg"
     own = size.inertia
-    return Quantity("rotor", unit, 0.01 * own, 3.0 * own, 0.1 * own, amplitude=False, start=0.3 * own)
+    rotor = Quantity("rotor", unit, 0.01 * own, 3.0 * own, 0.1 * own, amplitude=False, start=0.3 * own)
+    return rotor, Quantity("share", "1", 0.0, 1.0, 0.1, amplitude=False, start=0.8)
 
 
 EFFECT = Effect(

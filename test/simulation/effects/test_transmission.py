@@ -13,6 +13,7 @@ from compass_ros.cells import Cell
 from compass_ros.errors import ConfigError
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, effect
+from compass_ros.simulation.rotors import onto_rotor
 from compass_ros.simulation.sizes import unit_joint
 from compass_ros.types import Floats
 from test.cells.written import content, parameter, written
@@ -60,7 +61,7 @@ def test_an_elastic_joint_is_two_masses_and_a_spring(tmp_path: Path, kind: str, 
         drive_torque = KP * (TOLD - q[1]) - KV * v[1] if drive == "position" else TOLD
         return np.array([torque / LINK, (drive_torque - torque) / ROTOR])
 
-    seen = angle(geared(tmp_path, drive, kind=kind), {"joint_elasticity": (compliance, ROTOR)}, kind=kind)
+    seen = angle(geared(tmp_path, drive, kind=kind), {"joint_elasticity": (compliance, ROTOR, 0.0)}, kind=kind)
     expected = flown(formula, np.array([0.2, 0.2]), np.zeros(2), SECONDS, 2000)[0]
     rigid = angle(geared(tmp_path, drive, kind=kind), {}, kind=kind)
     assert np.abs(seen[:, 0] - rigid[:, 0]).max() > 2e-3
@@ -70,14 +71,14 @@ def test_an_elastic_joint_is_two_masses_and_a_spring(tmp_path: Path, kind: str, 
 def test_a_stiff_gear_is_a_rigid_one(tmp_path: Path) -> None:
     cell = geared(tmp_path)
     rigid = angle(cell, {})
-    for name, numbers in (("joint_elasticity", (1e-5, ROTOR)), ("backlash", (1e-7, ROTOR))):
+    for name, numbers in (("joint_elasticity", (1e-5, ROTOR, 0.0)), ("backlash", (1e-7, ROTOR, 0.0))):
         assert np.abs(angle(cell, {name: numbers})[:, 0] - rigid[:, 0]).max() < 3e-3
 
 
 @pytest.mark.parametrize("play", [0.02, 0.1, 0.2])
 def test_a_motor_moves_half_its_play_before_the_joint_follows(tmp_path: Path, play: float) -> None:
     """Alone at first: theta = 0.2 + torque t^2 / (2 rotor); then both, within the play of each other."""
-    seen = angle(geared(tmp_path, "motor"), {"backlash": (play, ROTOR)})[:, 0]
+    seen = angle(geared(tmp_path, "motor"), {"backlash": (play, ROTOR, 0.0)})[:, 0]
     still = np.sqrt(play * ROTOR / TOLD)
     time = 5e-4 * np.arange(len(seen))
     assert (seen[time < 0.97 * still] == 0.2).all()
@@ -93,7 +94,7 @@ def test_within_its_play_a_servo_does_not_hold_its_joint(tmp_path: Path) -> None
     """Told where it stands, the motor stays; a push on the joint moves it through half the play and no further."""
     cell = geared(tmp_path)
     simulator = Simulator(cell, [Attached(effect("backlash").at(unit_joint("hinge")), ("axis",))], threads=1)
-    values = np.array([[0.0, 0.1, ROTOR]])
+    values = np.array([[0.0, 0.1, ROTOR, 0.0]])
     physics = simulator.physics
     model = simulator._player.written(physics, values)[0]
     data = mujoco.MjData(model)
@@ -104,9 +105,45 @@ def test_within_its_play_a_servo_does_not_hold_its_joint(tmp_path: Path) -> None
     assert data.qpos[1] - 0.2 == pytest.approx(0.03 / KP, rel=0.05)
 
 
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_friction_is_shared_with_the_motor(tmp_path: Path, share: float) -> None:
+    """By hand: each side loses its part, and the spring is between them."""
+    compliance, lost = 5e-2, 0.4
+
+    def formula(t: float, q: Floats, v: Floats) -> Floats:
+        torque = (q[1] - q[0]) / compliance + 0.1 * np.sqrt(ROTOR / compliance) * (v[1] - v[0])
+        on_link = torque - (1 - share) * lost * v[0]
+        return np.array([on_link / LINK, (TOLD - torque - share * lost * v[1]) / ROTOR])
+
+    cell = geared(tmp_path, "motor")
+    law = Attached(effect("joint_elasticity").at(unit_joint("hinge")), ("axis",))
+    values = np.array([[lost, compliance, ROTOR, share]])
+    seen = Simulator(cell, [law], threads=1).motion(values, np.array([[TOLD, 0.2]]), SECONDS).positions[0, -1, 0]
+    expected = flown(formula, np.array([0.2, 0.2]), np.zeros(2), SECONDS, 2000)[0]
+    assert seen == pytest.approx(expected, abs=2e-3 * abs(expected) + 5e-4)
+
+
+def test_a_motor_that_sticks_holds_its_joint_within_the_play(tmp_path: Path) -> None:
+    """With dry friction on the motor's side alone a push moves the joint through half the play; beyond it creeps."""
+    simulator = Simulator(
+        geared(tmp_path, "motor"), [Attached(effect("backlash").at(unit_joint("hinge")), ("axis",))], threads=1
+    )
+    model = simulator._player.written(simulator.physics, np.array([[0.0, 0.1, ROTOR, 0.0]]))[0]
+    moved = []
+    for share in (0.0, 1.0):
+        model.dof_frictionloss[:] = 3.0, 0.0
+        onto_rotor(model, "axis", ROTOR, share)
+        data = mujoco.MjData(model)
+        data.qfrc_applied[0] = 0.1
+        mujoco.mj_step(model, data, nstep=800)
+        moved.append(float(data.qpos[0]))
+    assert abs(moved[0]) < 0.01
+    assert moved[1] == pytest.approx(0.05, abs=0.01)
+
+
 @pytest.mark.parametrize("name", ["joint_elasticity", "backlash"])
 def test_the_measured_effort_is_the_motors(tmp_path: Path, name: str) -> None:
-    seen = angle(geared(tmp_path, "motor"), {name: (0.05, ROTOR)})
+    seen = angle(geared(tmp_path, "motor"), {name: (0.05, ROTOR, 0.0)})
     np.testing.assert_allclose(seen[5:, 1], TOLD)
 
 
@@ -116,18 +153,18 @@ def test_the_rotor_is_a_part_of_the_armature(tmp_path: Path, armature: float) ->
 
     But for the inertia that damping between two trees of bodies is to an implicit integrator: 2 x 2.5 % of the rotor.
     """
-    seen = angle(geared(tmp_path, "motor", armature), {"joint_elasticity": (1e-4, ROTOR)})[-1, 0]
+    seen = angle(geared(tmp_path, "motor", armature), {"joint_elasticity": (1e-4, ROTOR, 0.0)})[-1, 0]
     inertia = LINK + max(armature, ROTOR)
     assert seen == pytest.approx(0.2 + 0.5 * TOLD / inertia * SECONDS**2, rel=0.05 * ROTOR / inertia + 1e-3)
 
 
 def test_play_beside_an_elasticity_is_a_spring_with_a_dead_band(tmp_path: Path) -> None:
     """In either order."""
-    numbers = {"joint_elasticity": (0.05, ROTOR), "backlash": (0.1, ROTOR)}
+    numbers = {"joint_elasticity": (0.05, ROTOR, 0.0), "backlash": (0.1, ROTOR, 0.0)}
     cell = geared(tmp_path)
     both = angle(cell, numbers)
     np.testing.assert_array_equal(both, angle(cell, dict(reversed(numbers.items()))))
-    assert np.abs(both - angle(cell, {"joint_elasticity": (0.05, ROTOR)}))[:, 0].max() > 5e-3
+    assert np.abs(both - angle(cell, {"joint_elasticity": (0.05, ROTOR, 0.0)}))[:, 0].max() > 5e-3
 
 
 def test_a_joint_that_nothing_drives_has_no_gear(tmp_path: Path) -> None:
@@ -142,7 +179,7 @@ def test_costs_are_counted_together_and_the_plain_scene_comes_back(tmp_path: Pat
     wider = plain.with_effects([Attached(effect("backlash").at(unit_joint("hinge")), ("axis",))])
     told = np.array([[TOLD, 0.2]])
     first = plain.motion(plain.defaults[None], told, 0.1).positions
-    wider.motion(np.array([[0.0, 0.1, ROTOR]]), told, 0.1)
+    wider.motion(np.array([[0.0, 0.1, ROTOR, 0.0]]), told, 0.1)
     again = wider.with_effects([])
     assert (again.motion(plain.defaults[None], told, 0.1).positions == first).all()
     assert plain.rollouts == wider.rollouts == again.rollouts == 3
