@@ -25,7 +25,7 @@ def policy(
     body: Annotated[str, typer.Option("--object", help="tracked body that shall reach the goal")] = "puck2",
     goal: Annotated[str, typer.Option(help="its centre: x,y or x,y,z [m]")] = "0.43,0",
     radius: Annotated[float, typer.Option(min=0.001, help="of the goal [m]")] = 0.15,
-    rollouts: Annotated[int, typer.Option(min=64, help="shots that an agent is trained with")] = 1152,
+    rollouts: Annotated[int, typer.Option(min=64, help="shots that an agent is trained with")] = 4608,
     jitter: Annotated[float, typer.Option(min=0, help="repeatability of the arm, share of half the range")] = 0.05,
     seed: Annotated[int, typer.Option(min=0, help="decides all random numbers")] = 0,
     threads: Annotated[int, typer.Option(min=0, help="threads for rollouts; 0: all cores")] = 0,

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from compass_ros.policy.sac import Policy, learn
 from compass_ros.policy.shots import Shots
-from compass_ros.types import Floats, Report, silent
+from compass_ros.types import Floats, Progress, Report, silent
 
-ROLLOUTS = 1152
-"""Shots that an agent is trained with."""
+ROLLOUTS = 4608
+"""Shots that an agent is trained with, in all beginnings."""
+BEGINNINGS = 2
+"""Agents that are trained from other random numbers; the one that does better in its own simulator is taken. Of five in
+a simulator of the fan at high speed three scored there after 1152 shots each, four after 2304, and four after 4608."""
+_JUDGED = 64
+"""Shots by which they are compared."""
 SIDE_BY_SIDE = 64
 """Shots that are played at once (the paper's table of SAC)."""
 
@@ -56,4 +61,17 @@ class _OneShot:
 
 def train(shots: Shots, rollouts: int = ROLLOUTS, seed: int = 0, report: Report = silent) -> Agent:
     """Train for about `rollouts` shots. The same seed gives the same agent on the same machine."""
-    return Agent(learn(_OneShot(shots, seed), rollouts, seed, report=report), shots.start)
+    goes_on = True
+
+    def shared(progress: Progress) -> bool:
+        nonlocal goes_on
+        goes_on = report(replace(progress, done=(len(agents) + progress.done) / BEGINNINGS))
+        return goes_on
+
+    agents: list[Agent] = []
+    while goes_on and len(agents) < BEGINNINGS:
+        own = BEGINNINGS * seed + len(agents)
+        agents.append(Agent(learn(_OneShot(shots, own), rollouts // BEGINNINGS, own, report=shared), shots.start))
+    judged = [shots.judge(agent.action(), 0.0, seed, _JUDGED) for agent in agents]
+    best = min(range(len(agents)), key=lambda k: (-judged[k].success, judged[k].distance))
+    return agents[best]
