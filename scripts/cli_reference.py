@@ -25,8 +25,8 @@ found; 2: wrong use. The fields of `calibrate --config` stand at [the end](#sett
 SETTINGS = """
 ## Settings
 
-`compass calibrate --config SETTINGS.yaml` takes any of these; what the file says counts, and not the command line. A name that is
-not among them is refused, with the nearest one that is.
+`compass calibrate --config SETTINGS.yaml` takes any of these; what the file says counts, and not the command line. A
+name that is not among them is refused, with the nearest one that is.
 
     episodes: 24
     windows: 12
