@@ -167,17 +167,26 @@ def _counted(hit: Bools, distance: Floats, first: int) -> dict[str, object]:
 def differences(experiment: Experiment, belief: Belief, commands: Floats, played: Played, seed: int) -> Floats:
     """(S,) trajectory difference of a simulator in S shots, the mean over the factors [m]."""
     said = belief.observe(commands, played.time_s, np.random.default_rng([seed, 3]))
-    return np.asarray(factor_distance(experiment.cell, said, played.seen).sum(axis=1).mean(axis=1))
+    return apart(experiment, said, played.seen)
+
+
+def apart(experiment: Experiment, one: Floats, other: Floats) -> Floats:
+    """(S,) trajectory difference of (S, T, C) recordings, the mean over the factors [m]."""
+    return np.asarray(factor_distance(experiment.cell, one, other).sum(axis=1).mean(axis=1))
 
 
 def compared(experiment: Experiment, condition: str, simulator: str, plan: Plan, folder: Path, threads: int,
              count: int = 50) -> dict[str, object]:  # fmt: skip
-    """A row on shots that nobody was given: the trajectory difference of one simulator."""
+    """A row on shots that nobody was given: the difference of one simulator, or of the cell that plays them again."""
     own = folder / f"{experiment.name}-{condition}-{plan.recordings}"
-    belief = Makers(experiment, condition, recorded(experiment, condition, plan.recordings, 0), own,
-                    threads=threads).make(simulator, fine=True)  # fmt: skip
     commands = experiment.commands(count, 99)
-    d = differences(experiment, belief, commands, experiment.play(condition, commands, 99), 0)
+    played = experiment.play(condition, commands, 99)
+    if simulator == "itself":
+        d = apart(experiment, experiment.play(condition, commands, 100).seen, played.seen)
+    else:
+        episodes = recorded(experiment, condition, plan.recordings, 0)
+        belief = Makers(experiment, condition, episodes, own, threads=threads).make(simulator, fine=True)
+        d = differences(experiment, belief, commands, played, 0)
     return {"difference_m": [round(float(x), 3) for x in (d.min(), d.max(), d.mean())], "shots": count}
 
 
@@ -185,7 +194,7 @@ def compare(experiment: Experiment, plan: Plan, file: Path, folder: Path, thread
     """The same for all simulators and base conditions that `file` does not have yet, as rows of seed -1."""
     known, added = {key_of(row) for row in read(file)}, 0
     for condition in (c for c in plan.conditions if c in experiment.conditions):
-        for simulator in (s for s in plan.simulators if s != "itself"):
+        for simulator in plan.simulators:
             key = (experiment.name, condition, simulator, plan.recordings, -1)
             if key not in known:
                 row = compared(experiment, condition, simulator, plan, folder, threads)
