@@ -5,10 +5,11 @@ python scripts/cli_reference.py
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
-from pydantic_core import PydanticUndefined
+from pydantic import TypeAdapter
 from typer.main import get_command
 
 from compass_ros.cli import app
@@ -47,9 +48,9 @@ def page() -> str:
 def _settings(of: type, before: str) -> str:
     """A table of the fields of a configuration."""
     rows = []
-    for name, field in of.__pydantic_fields__.items():  # type: ignore[attr-defined]
-        default = "" if field.default is PydanticUndefined else f"`{field.default}`".replace("True", "true")
-        rows.append(f"| `{before}{name}` | {_cell(field.description)} | {default} |")
+    for name, field in TypeAdapter(of).json_schema()["properties"].items():
+        default = f"`{json.dumps(field['default'])}`".replace('"', "") if "default" in field else ""
+        rows.append(f"| `{before}{name}` | {_cell(field['description'])} | {default} |")
     return "\n".join(["| | | default |", "|---|---|---|", *rows, ""]) + "\n"
 
 

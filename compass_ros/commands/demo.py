@@ -7,7 +7,6 @@ import signal
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -57,7 +56,7 @@ def demo(
     from compass_ros.reporting.from_json import from_json
     from compass_ros.reporting.table import parameter_table, print_verdict
 
-    signal.signal(signal.SIGTERM, _interrupt)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # what ends it ends its nodes first, as Ctrl-C does
     started = time.monotonic()
     drawn = "" if seed is not None else DEFAULT_EFFECT
     plan = Plan(load(cell), shots, seed, drawn if effect is None else effect, method, out, answers)
@@ -106,8 +105,3 @@ def difference_line(gap: Mapping[str, Any]) -> str:
         f"Held-out trajectory difference: {nominal:.3f} m with the defaults, {best:.3f} m now, "
         f"{best / nominal:.3f} of it."
     )
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    """What ends the command ends its nodes first, as Ctrl-C does."""
-    raise KeyboardInterrupt

@@ -99,15 +99,17 @@ def sources(parts: Iterable[str]) -> str:
     return total.hexdigest()[:16]
 
 
+class _Bare(ast.NodeTransformer):
+    """Leaves out strings that stand alone."""
+
+    def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
+        is_text = isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+        return None if is_text else node
+
+
 def _tree(text: str) -> bytes:
-    """The syntax tree of a module without strings that stand alone."""
-
-    class Bare(ast.NodeTransformer):
-        def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
-            is_text = isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
-            return None if is_text else node
-
-    return ast.dump(Bare().visit(ast.parse(text))).encode()
+    """The syntax tree of a module, as this Python writes it."""
+    return ast.dump(_Bare().visit(ast.parse(text))).encode()
 
 
 def stale(line: Line | None, method_sources: str, world_sources: str) -> bool:
