@@ -65,6 +65,7 @@ def pose(simulator: Simulator, data: Recordings, noise: Noise, yardstick: Yardst
         launch_std=simulator.launch_std(simulator.defaults, data.start_std),
         prior_mean=simulator.defaults,
         prior_std=np.array([p.half_width for p in simulator.parameters]),
+        systematic=noise.systematic,
     )
     return Problem(
         differences=replay.differences,

@@ -72,6 +72,9 @@ class Likelihood:
     """Whether these are windows of long recordings, each with a first state of its own."""
     smooth: bool = False
     """Whether the simulator is known to have no roughness here: differences of one length are as good as of another."""
+    systematic: Floats | None = None
+    """(C,) standard deviation of the part of `sigma` that depends on the place and not on the frame [m or rad]: what
+    the sensor states beyond its scatter (`Noise.systematic`); None: it states nothing."""
 
     @property
     def low(self) -> Floats:

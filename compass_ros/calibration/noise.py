@@ -44,6 +44,8 @@ class Noise:
     """(C,) step of an encoder [m or rad], 0 where none was found; None: none anywhere."""
     with_outliers: Floats | None = None
     """(C,) root mean square of all that was seen of it, outliers as far away as they are; None: as `sigma`."""
+    systematic: Floats | None = None
+    """(C,) what the sensor states beyond its scatter [m or rad]: errors that frames do not average out; None: none."""
 
     @property
     def rms(self) -> Floats:
@@ -118,9 +120,11 @@ def measure_noise(time_s: Floats, measured: Floats, expected: float, stated: Flo
     sigma, beyond, correlation = _scatter(time_s, measured, expected, least)
     with_outliers = np.hypot(sigma, beyond)
     sigma = np.maximum(sigma, np.maximum(step / ROOT_12, least))
-    if stated is not None:
+    systematic = None
+    if stated is not None and np.any(stated > sigma):
+        systematic = np.sqrt(np.maximum(np.maximum(stated, 0.0) ** 2 - sigma**2, 0.0))
         sigma = np.maximum(sigma, stated)
-    return Noise(sigma, correlation, step if step.any() else None, with_outliers)
+    return Noise(sigma, correlation, step if step.any() else None, with_outliers, systematic)
 
 
 def _scatter(time_s: Floats, measured: Floats, expected: float, least: float) -> tuple[Floats, Floats, float]:

@@ -89,7 +89,11 @@ def weigh(
         return fit_failed(f"{cause}, which is the simulator's numerics and not physics")
     tell("weigh effects", 0.95)
     said = Judge(found, held_out, noise, alpha, threshold, odds, undetectable(first), seed, warnings).discovery()
-    return replace(said, open_sigma=left_open(refined, held_out, seed)) if said.mismatch.verdict == "none" else said
+    return (
+        replace(said, open_sigma=left_open(simulator, refined, held_out, seed))
+        if said.mismatch.verdict == "none"
+        else said
+    )
 
 
 def undetectable(first: list[Ranked]) -> tuple[str, ...]:

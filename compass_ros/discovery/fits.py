@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import log
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from compass_ros.discovery.evidence import solve
 from compass_ros.discovery.first_order import WIDTH, Ranked
 from compass_ros.discovery.hypothesis import Hypothesis, widened
 from compass_ros.discovery.response import respond
-from compass_ros.discovery.settings import PRIOR_UNKNOWN
+from compass_ros.discovery.settings import PRIOR_UNKNOWN, SLIGHT
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats, Ints
 
@@ -34,7 +35,7 @@ ETA = 3
 """One in so many goes on (Li et al. 2018, Hyperband: 3 or 4)."""
 FEW = 5
 """Gauss-Newton steps of a fit that begins near its end."""
-_SLIGHT = 0.3
+_LAST = 0.3
 """Gain [log likelihood] of a step that is the last one: models are compared by whole units."""
 
 
@@ -111,7 +112,8 @@ def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats
     A simulator without a law bends other parameters to stand for it, and from there a fit may end in a valley beside
     the right one. So the parent is fitted anew from the cell's first guess, to the beginning of each episode and to
     more and more of it, until a free discrepancy is called for: the fit before that is not bent yet. From there each
-    law goes on, the better third of them to the next horizon. `starts`: each law with its (q,) numbers.
+    law goes on, to the next horizon the better third of them and all that are as likely as SLIGHT of the best.
+    `starts`: each law with its (q,) numbers.
     """
     values, begun, horizons = _unbent(parent, rows)
     runners = [_runner(parent, laws, np.append(values, numbers), rows, begun, horizons)
@@ -121,7 +123,10 @@ def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats
     for _ in horizons:
         for i in alive:
             found[i] = next(runners[i])
-        alive = sorted(alive, key=lambda i: found[i][1].point.cost)[: max(len(alive) // ETA, 2)]
+        alive = sorted(alive, key=lambda i: found[i][1].point.cost)
+        last = max(len(alive) // ETA, 2)
+        least = found[alive[0]][1].point.cost - log(SLIGHT)
+        alive = [i for k, i in enumerate(alive) if k < last or found[i][1].point.cost < least]
     return [_at_the_end(parent, starts[i][0], *found[i]) for i in alive] if horizons else []
 
 
@@ -196,7 +201,7 @@ def whole(parent: Hypothesis, begun: Begun) -> Hypothesis:
     if robust > parent.fit.robust:  # what these episodes did not hold is far off
         point = minimise(likelihood, point, free, FEW, robust, 3.0, linear, fresh=False, steps=steps).point
         linear = None
-    fit = minimise(likelihood, point, free, FEW, parent.fit.robust, _SLIGHT, linear, steps=steps)
+    fit = minimise(likelihood, point, free, FEW, parent.fit.robust, _LAST, linear, steps=steps)
     return Hypothesis((*parent.laws, *begun.laws), simulator, likelihood, fit, without=parent.bare)
 
 
@@ -224,5 +229,5 @@ def without(model: Hypothesis, laws: Sequence[Attached]) -> Hypothesis:
     point = replace(model.fit.point, values=model.fit.point.values[at], cost=np.inf)
     free = np.flatnonzero(np.isin(at, model.fit.free))
     linear = model.fit.linear.only(np.isin(model.fit.free, at))
-    fit = minimise(likelihood, point, free, FEW, model.fit.robust, _SLIGHT, linear)
+    fit = minimise(likelihood, point, free, FEW, model.fit.robust, _LAST, linear)
     return Hypothesis(tuple(kept), simulator, likelihood, fit, without=model.bare)

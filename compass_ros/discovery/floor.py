@@ -3,8 +3,8 @@
 `none` means that what is left is noise. An error in held-out episodes of TWICE the noise floor is three quarters
 something else in mean square, so it is never `none` beside it. It may be noise that neither stillness nor calm flight
 show (frames that are lost, stamps that are a little off, blur); then the floor is higher than it was taken for. Or
-something is missing for which no law stands. What the error bars of the parameters leave open there is no such error: a
-rebound from an edge that no parameter is known well enough for.
+something is missing for which no law stands. What the error bars of the parameters and the time step leave open there
+is no such error: a rebound from an edge that no parameter, and no step, is exact enough for.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise, correlation_of
 from compass_ros.calibration.refine import Refined
 from compass_ros.calibration.residuals import residual_at
+from compass_ros.discovery.nuisances import finite_step
+from compass_ros.simulation import Simulator
 from compass_ros.types import Floats, Mismatch, Where
 
 TWICE = 2.0
@@ -46,11 +48,13 @@ def shown_noise(noise: Noise, likelihood: Likelihood, fit: Fit) -> Noise:
     return replace(noise, with_outliers=np.maximum(noise.rms, np.sqrt(noise.sigma**2 + more)))
 
 
-def left_open(refined: Refined, held_out: Likelihood, seed: int) -> float:
-    """How far [sigma, rms] predictions of held-out episodes may be off for the parameters' error bars alone.
+def left_open(simulator: Simulator, refined: Refined, held_out: Likelihood, seed: int) -> float:
+    """How far [sigma, rms] predictions of held-out episodes may be off for the parameters' error bars and the time step
+    alone.
 
-    The largest over some draws of the parameters: a posterior predictive check (Gelman, Meng and Stern 1996), which a
-    right model fails once in DRAWS + 1 times where collisions amplify everything.
+    The largest over some draws of the parameters, and of what the step does in each episode where things touch
+    (`nuisances`): a posterior predictive check (Gelman, Meng and Stern 1996), which a right model fails once in
+    DRAWS + 1 times where collisions amplify everything.
     """
     fit, rng = refined.fit, np.random.default_rng(seed)
     seen = ~np.isnan(held_out.measured)
@@ -60,7 +64,11 @@ def left_open(refined: Refined, held_out: Likelihood, seed: int) -> float:
     moves = rng.multivariate_normal(np.zeros(len(fit.free)), refined.among, DRAWS, check_valid="ignore")
     points = [Point(fit.point.values, still, np.inf), *(_moved(held_out, fit, move) for move in moves)]
     _, residuals = cost(held_out, points, fit.robust)
-    return float(np.sqrt(np.mean((residuals[1:] - residuals[0])[:, seen] ** 2, axis=1)).max())
+    off = residuals[1:] - residuals[0]
+    if simulator.places.touching:
+        step = finite_step(simulator, held_out, points[0], residuals[0])
+        off = off + rng.standard_normal((DRAWS, len(step), 1, 1)) * step
+    return float(np.sqrt(np.mean(off[:, seen] ** 2, axis=1)).max())
 
 
 def _moved(held_out: Likelihood, fit: Fit, move: Floats) -> Point:
@@ -72,11 +80,11 @@ def _moved(held_out: Likelihood, fit: Fit, move: Floats) -> Point:
 
 def honest(mismatch: Mismatch, error: float, floor: float, open_sigma: float = 0.0) -> Mismatch:
     """The answer as it may be published beside these numbers: `none` never beside an error of TWICE the floor, and of
-    what the parameters leave open there (`left_open`)."""
+    what is left open there (`left_open`)."""
     if mismatch.verdict != "none" or error < TWICE * floor:
         return mismatch
     if error < TWICE * floor * np.hypot(1.0, open_sigma):
-        times = f"{error / floor:.1f} times the noise, which the error bars of the parameters leave open there"
+        times = f"{error / floor:.1f} times the noise, which error bars of the parameters and the time step leave open"
         return replace(mismatch, sentence=f"{mismatch.sentence} The held-out error is {times}.")
     sentence = f"Something differs that no known law explains: held-out error {error / floor:.1f} times the noise."
     return replace(mismatch, verdict="unknown", where=EVERYWHERE, sentence=sentence)

@@ -14,6 +14,7 @@ from compass_ros.discovery.fits import Begun, from_parent, race, telling, whole,
 from compass_ros.discovery.hypothesis import Hypothesis, name_of
 from compass_ros.discovery.odds import Known, Prior
 from compass_ros.discovery.scatter import ranked_scatter, with_scatter
+from compass_ros.discovery.settings import SLIGHT
 from compass_ros.simulation.effects import Attached
 from compass_ros.simulation.sites import PLANAR
 from compass_ros.types import Floats
@@ -22,9 +23,6 @@ RACED = 4
 """Neighbours that are fitted from their parent: a budget."""
 STEPS = 4
 """Gauss-Newton steps of each fit from its parent: a budget."""
-SLIGHT = 0.01
-"""Probability that is left to models that are not brought to their optimum: a budget. It is the
-default false-alarm rate and does not follow that setting."""
 
 
 def rank(first: FirstOrder, candidates: Sequence[Candidate]) -> list[Ranked]:
@@ -47,7 +45,8 @@ def rank(first: FirstOrder, candidates: Sequence[Candidate]) -> list[Ranked]:
 
 
 def widen(known: Known, best: Hypothesis, ranked: Sequence[Ranked], called: bool) -> None:
-    """Fit the neighbours of a model with one law more; from where nothing is bent, where more is `called` for.
+    """Fit the neighbours of a model with one law more; from where nothing is bent too, beside a law where more is
+    `called` for.
 
     They are fitted to some episodes, and the best of them to all.
     """
@@ -57,7 +56,7 @@ def widen(known: Known, best: Hypothesis, ranked: Sequence[Ranked], called: bool
         tried = [r for r, odds in zip(tried, beside(best, tried, known.prior), strict=True) if odds > 0]
     known.take(with_scatter(best, r) for r in tried if r.candidate.attached.effect.scattered)
     begun = [from_parent(best, r, rows, STEPS) for r in tried if not r.candidate.attached.effect.scattered]
-    if called and few:  # what takes all episodes to tell hardly bends a fit
+    if not best.laws or (called and few):  # what takes all episodes to tell beside a law hardly bends its fit
         begun += race(best, cold_starts(ranked, best), rows)
     known.take(whole(best, one) for one in probable(begun, known.prior))
 

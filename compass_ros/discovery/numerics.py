@@ -10,7 +10,7 @@ from compass_ros.calibration.cost import robust_weight
 from compass_ros.calibration.least_squares import normal_equations
 from compass_ros.discovery.evidence import solve
 from compass_ros.discovery.hypothesis import Hypothesis
-from compass_ros.discovery.nuisances import moved_by
+from compass_ros.discovery.nuisances import finite_step, moved_by
 from compass_ros.simulation.numerics import other_numerics
 from compass_ros.types import Floats
 
@@ -22,7 +22,7 @@ def with_numerics(model: Hypothesis) -> Floats:
     parameters are those of this simulator.
     """
     simulator, likelihood, fit = model.simulator, model.likelihood, model.fit
-    moved = moved_by(simulator, likelihood, fit, {"timestep": 0.5 * simulator.options.timestep})
+    moved = 0.5 * finite_step(simulator, likelihood, fit.point, fit.linear.residual)
     weight = robust_weight(fit.linear.residual, fit.robust)
     hessian, _ = normal_equations(likelihood, fit.point, fit.linear, fit.free, fit.robust)
     pull = np.einsum("efcp,efc->p", fit.linear.jacobian, weight * moved)
@@ -41,7 +41,7 @@ def numerics_as_model(plain: Hypothesis, best: float) -> str:
     """
     tangent, shape = plain.response.tangent, plain.response.tangent.residual.shape
     for what, options in other_numerics(plain.simulator.options):
-        moved = moved_by(plain.simulator, plain.likelihood, plain.fit, options)
+        moved = moved_by(plain.simulator, plain.likelihood, plain.fit.point, plain.fit.linear.residual, options)
         changed = replace(tangent, residual=tangent.residual + moved.reshape(shape))
         if solve(changed, changed.normal, None).log - plain.free.alone > best:
             return f"what is left goes away with {what}"

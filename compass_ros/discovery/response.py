@@ -61,20 +61,22 @@ class Response:
 
     @cached_property
     def tangent(self) -> Tangent:
-        """Beside the parameters stand the engine's approximations, as nuisances."""
+        """Beside the parameters stand the engine's approximations, as nuisances; the time step's of each episode too
+        where things touch, for a contact falls into a step by chance (`nuisances`)."""
         likelihood, fit = self.likelihood, self.fit
         episodes = len(likelihood.inputs)
         linear, point = fit.linear, fit.point
         rows = (episodes, linear.residual[0].size)
         engine = nuisances(self.simulator, likelihood, fit).reshape(*rows, -1)
+        by_chance = engine[:, :, : int(self.simulator.places.touching)]
         known = ((likelihood.prior_mean - point.values) / likelihood.prior_std)[fit.free[self.inside]]
         return Tangent(
             residual=linear.residual.reshape(rows),
             parameters=np.concatenate([linear.jacobian.reshape(*rows, -1)[:, :, self.inside], engine], axis=2),
-            own=linear.launch_jacobian.reshape(*rows, -1),
+            own=np.concatenate([linear.launch_jacobian.reshape(*rows, -1), by_chance], axis=2),
             pushes=self.pushes.reshape(*rows, -1),
             away=np.append(known, np.zeros(engine.shape[2])),
-            own_away=-launches_away(likelihood, point),
+            own_away=np.pad(-launches_away(likelihood, point), ((0, 0), (0, by_chance.shape[2]))),
             robust=fit.robust,
             correlation_time=likelihood.correlation_time,
         )
@@ -240,7 +242,7 @@ class Response:
             predicted = sensing(lambda _: plain, of, context)(likelihood.time_s)
             there = np.nan_to_num(likelihood.difference(predicted, likelihood.measured) / likelihood.sigma)
             begins = (wider.truly(np.concatenate([values, of], axis=1), told) - read)[:, random] / std[random]
-            moved = (self.tangent.own @ begins[:, :, None])[..., 0]
+            moved = (self.tangent.own[:, :, : begins.shape[1]] @ begins[:, :, None])[..., 0]
             return np.asarray(there.reshape(len(plain), -1) - self.tangent.residual + moved)
 
         return change

@@ -16,9 +16,9 @@ from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.fits import finished, without
 from compass_ros.discovery.hypothesis import Hypothesis, name_of
-from compass_ros.discovery.neighbours import SLIGHT, exchange, rank, widen
+from compass_ros.discovery.neighbours import exchange, rank, widen
 from compass_ros.discovery.odds import Known, Prior
-from compass_ros.discovery.settings import PRIOR_UNKNOWN, RHO, RHO_PRIOR
+from compass_ros.discovery.settings import PRIOR_UNKNOWN, RHO, RHO_PRIOR, SLIGHT
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
 

@@ -18,3 +18,6 @@ PRIOR_UNKNOWN = float(np.log(0.5))
 PRIOR_LAW = float(np.log(0.5))
 """Log prior odds against the plain model: half of the probability is that nothing is missing, a quarter that of
 `unknown`, a quarter that of all laws together."""
+SLIGHT = 0.01
+"""Probability that is left to models that are not fitted any further: a budget. It is the default false-alarm rate and
+does not follow that setting."""

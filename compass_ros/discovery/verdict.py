@@ -13,10 +13,10 @@ from compass_ros.discovery.finding import Discovery, Tried, Weighed, held_out_er
 from compass_ros.discovery.floor import TWICE, shown_noise
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.maps import table_map
-from compass_ros.discovery.neighbours import SLIGHT
 from compass_ros.discovery.next_shot import next_experiment
 from compass_ros.discovery.numerics import with_numerics
 from compass_ros.discovery.search import Found
+from compass_ros.discovery.settings import SLIGHT
 from compass_ros.discovery.where import whereabouts
 from compass_ros.discovery.words import DEPENDS, errors, missing, place, value_of, where_of
 from compass_ros.simulation import Simulator

@@ -17,7 +17,7 @@ from compass_ros.calibration.least_squares import Fit
 from compass_ros.cells import load
 from compass_ros.discovery.evidence import Tangent, evidences
 from compass_ros.discovery.hypothesis import Hypothesis
-from compass_ros.discovery.nuisances import finite_step, nuisances
+from compass_ros.discovery.nuisances import finite_step, nuisances, stated_errors
 from compass_ros.discovery.numerics import numerics_as_model
 from compass_ros.discovery.planned import perfect
 from compass_ros.discovery.response import Response
@@ -36,10 +36,16 @@ def cause(response: Response) -> str:
 
 
 def without_nuisances(response: Response) -> Tangent:
-    """The tangent with the parameters alone."""
-    kept = len(response.inside)
+    """The tangent with the parameters and launches alone."""
+    kept, own = len(response.inside), response.fit.linear.launch_jacobian.shape[-1]
     tangent = response.tangent
-    return replace(tangent, parameters=tangent.parameters[:, :, :kept], away=tangent.away[:kept])
+    return replace(
+        tangent,
+        parameters=tangent.parameters[:, :, :kept],
+        away=tangent.away[:kept],
+        own=tangent.own[:, :, :own],
+        own_away=tangent.own_away[:, :own],
+    )
 
 
 @pytest.mark.parametrize(
@@ -62,6 +68,21 @@ def test_other_numerics_call_for_nothing(
     plain, blind = Hypothesis((), response.simulator, response.likelihood, response.fit), without_nuisances(response)
     assert plain.free.log - plain.free.alone < 0
     assert evidences(response.tangent, [None])[0].log > evidences(blind, [None])[0].log + 5
+
+
+def test_a_contact_falls_into_a_step_by_chance() -> None:
+    """An engine whose steps fall otherwise in each shot calls for nothing; with one number for all shots it would."""
+    clean = perfect(simulator(), CALM, RATE, 0.1 * SIGMA)
+    shots = []
+    for share, shot, time in zip((0.5, 1.5, 0.5), CALM, clean.time_s, strict=True):
+        other = Simulator(cell(), options={"timestep": share * simulator().options.timestep})
+        shots.append(other.observe(simulator().defaults[None], shot[None], time[None])[0])
+    response = response_of(replace(clean, measured=np.stack(shots)))
+    plain, tangent = Hypothesis((), response.simulator, response.likelihood, response.fit), response.tangent
+    launches = response.fit.linear.launch_jacobian.shape[-1]
+    common = replace(tangent, own=tangent.own[:, :, :launches], own_away=tangent.own_away[:, :launches])
+    assert plain.free.log - plain.free.alone < 0
+    assert evidences(tangent, [None])[0].log > evidences(common, [None])[0].log + 1000
 
 
 def test_friction_that_holds_where_the_engine_creeps_calls_for_nothing(tmp_path: Path) -> None:
@@ -101,7 +122,7 @@ def test_the_time_step_turns_an_orientation_by_an_angle() -> None:
     turned = finer.observe(coarse.defaults[None], likelihood.inputs, likelihood.time_s)[0, :, 3:7]
     from_, to = (Rotation.from_quat(q, scalar_first=True) for q in (seen.measured[0, :, 3:7], turned))
     angle = (from_.inv() * to).magnitude()
-    found = SIGMA * finite_step(coarse, likelihood, fit)[0, :, 3:7]
+    found = SIGMA * finite_step(coarse, likelihood, point, fit.linear.residual)[0, :, 3:7]
     assert angle.max() > 1e-3
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 2 * angle, atol=1e-9)
     step, contacts, friction = np.moveaxis(nuisances(coarse, likelihood, fit), -1, 0)
@@ -120,3 +141,39 @@ def test_contacts_and_their_friction_are_unsure() -> None:
     _, contacts, friction = np.moveaxis(SIGMA * nuisances(plain, likelihood, fit)[..., :2, :], -1, 0)
     assert 1e-4 < np.abs(contacts).max() < 5e-3
     assert 1e-4 < np.abs(friction).max() < 5e-3
+
+
+def test_a_sensors_stated_error_is_one_function_of_the_place() -> None:
+    """Components sum to a process of the stated variance, alike where the same place is seen again, and smooth."""
+    rng = np.random.default_rng(0)
+    once = rng.uniform(-0.5, 0.5, (5, 40, 4))
+    likelihood = perfect(simulator(), CALM, RATE, SIGMA)
+    measured = np.concatenate([once, once], axis=1)
+    seen = replace(likelihood, measured=measured, sigma=np.full(measured.shape, SIGMA))
+    assert stated_errors(cell(), seen).shape == (*measured.shape, 0)
+    columns = stated_errors(cell(), replace(seen, systematic=np.array([2 * SIGMA, 0.0, SIGMA, SIGMA])))
+    np.testing.assert_allclose(columns[:, :40], columns[:, 40:], atol=1e-9)
+    size = np.sqrt(np.sum(columns**2, axis=-1))
+    np.testing.assert_allclose(size, np.broadcast_to([2, 0, 1, 1], size.shape), rtol=0.1)
+    own = np.flatnonzero(np.any(columns[..., 2, :] != 0, axis=(0, 1)))
+    assert not np.any(columns[:, :, [0, 1, 3]][..., own])
+    bend = (once[..., 2] ** 2 + once[..., 3] ** 2) * once[..., 2]
+    functions = columns[:, :40, 2, own].reshape(-1, len(own))
+    left = bend.ravel() - functions @ np.linalg.lstsq(functions, bend.ravel(), rcond=None)[0]
+    assert left.std() < 0.1 * bend.std()
+
+
+@pytest.mark.parametrize(("stated", "called_for"), [(0.0, True), (1.0, False)])
+def test_what_a_sensor_states_of_itself_calls_for_nothing(stated: float, called_for: bool) -> None:
+    """A lens as small as the error that a tracker states of its frame, seen through a tenth of that from frame to
+    frame."""
+    lens = Attached(EFFECTS["lens_distortion"], ())
+    planted = recorded(lens, [30 * q.scale if q.amplitude else q.start for q in lens.effect.quantities])
+    plain = recorded(None, [])
+    moved = planted.measured - plain.measured
+    error = float(np.sqrt(np.nanmean(moved**2)))
+    sensed = replace(plain, measured=plain.measured + moved, sigma=np.full(plain.sigma.shape, SIGMA))
+    response = response_of(replace(sensed, systematic=stated * error * np.ones(moved.shape[2])))
+    found = Hypothesis((), simulator(), response.likelihood, response.fit).free
+    assert error > 2 * SIGMA
+    assert (found.log - found.alone > 10) == called_for
