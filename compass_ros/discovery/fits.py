@@ -107,7 +107,7 @@ def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:
 
 
 def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats]], rows: Ints) -> list[Begun]:
-    """The best two of models with one more law each, by successive halving over a growing horizon of some episodes.
+    """The best of models with one law more each, by successive halving over a growing horizon of some episodes.
 
     A simulator without a law bends other parameters to stand for it, and from there a fit may end in a valley beside
     the right one. So the parent is fitted anew from the cell's first guess, to the beginning of each episode and to
@@ -120,7 +120,7 @@ def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats
                for laws, numbers in starts]  # fmt: skip
     alive = list(range(len(runners)))
     found: dict[int, tuple[Likelihood, Fit]] = {}
-    for _ in horizons:
+    for _ in horizons if starts else ():
         for i in alive:
             found[i] = next(runners[i])
         alive = sorted(alive, key=lambda i: found[i][1].point.cost)
