@@ -71,6 +71,8 @@ def stated_errors(cell: Cell, likelihood: Likelihood) -> Floats:
     out = [np.zeros((*shape, 0))]
     for columns in _stated(cell, systematic):
         here = ~np.isnan(likelihood.measured[..., columns]).any(axis=2)
+        if not here.any():
+            continue
         functions = _components(likelihood.measured[..., columns][here])
         for column in columns:
             change = np.zeros((*shape, functions.shape[1]))
