@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -88,10 +89,12 @@ def test_nothing_is_missing_there(tmp_path: Path) -> None:
     assert calibrate(recorded(of), of, CalibrationConfig(threads=1))[0].mismatch.verdict == "none"
 
 
-def test_a_launch_in_a_side_minimum_is_found_anew_and_the_others_stay() -> None:
+@pytest.mark.parametrize("windowed", [False, True])
+def test_a_launch_in_a_side_minimum_is_found_anew_and_the_others_stay(windowed: bool) -> None:
     """Sines of six seconds with their frequency as the launch: two of four episodes begin beside it."""
     commanded, launched = np.full((4, 1), 1.0), np.array([[1.02], [0.97], [1.05], [0.99]])
     given = likelihood(oscillation, (0.0,), commanded, launched=launched, launch_std=0.1, noise=0.01, seconds=6.0)
+    given = replace(given, windowed=windowed)
     aside = np.array([[0.02], [0.3], [0.05], [-0.25]])
     fit = minimise(given, Point(np.zeros(1), aside, np.inf), NONE, 20, ROBUST)
     assert np.abs(fit.point.launch - (launched - 1)).max() > 0.1
