@@ -89,11 +89,9 @@ def weigh(
         return fit_failed(f"{cause}, which is the simulator's numerics and not physics")
     tell("weigh effects", 0.95)
     said = Judge(found, held_out, noise, alpha, threshold, odds, undetectable(first), seed, warnings).discovery()
-    return (
-        replace(said, open_sigma=left_open(simulator, refined, held_out, seed))
-        if said.mismatch.verdict == "none"
-        else said
-    )
+    if said.mismatch.verdict != "none":
+        return said
+    return replace(said, open_sigma=left_open(simulator, refined, held_out, seed))
 
 
 def undetectable(first: list[Ranked]) -> tuple[str, ...]:

@@ -15,11 +15,8 @@ import numpy as np
 from compass_ros.discovery.evidence import Tangent, evidences, log_sum
 from compass_ros.discovery.kernels import features_of, of_sizes, shared
 from compass_ros.discovery.response import Response
-from compass_ros.discovery.settings import FREE, MEMORY_S, RHO, RHO_PRIOR
+from compass_ros.discovery.settings import FREE, KEPT, MEMORY_S, RHO, RHO_PRIOR
 from compass_ros.types import Floats
-
-_KEPT = 1e-3
-"""Least variance of a component of the process that is kept, as a share of the largest."""
 
 
 def spread(response: Response, sizes: Floats) -> Floats | None:
@@ -27,7 +24,7 @@ def spread(response: Response, sizes: Floats) -> Floats | None:
     moments = response.kicks.moments_s
     kernel = np.exp(-0.5 * ((moments[:, None] - moments) / MEMORY_S) ** 2)
     variance, axes = np.linalg.eigh(kernel)
-    kept = variance > _KEPT * variance[-1]
+    kept = variance > KEPT * variance[-1]
     root = axes[:, kept] * np.sqrt(variance[kept])
     on = np.flatnonzero(sizes > 0)
     if not len(on):

@@ -115,12 +115,14 @@ def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats
     law goes on, to the next horizon the better third of them and all that are as likely as SLIGHT of the best.
     `starts`: each law with its (q,) numbers.
     """
+    if not starts:
+        return []
     values, begun, horizons = _unbent(parent, rows)
     runners = [_runner(parent, laws, np.append(values, numbers), rows, begun, horizons)
                for laws, numbers in starts]  # fmt: skip
     alive = list(range(len(runners)))
     found: dict[int, tuple[Likelihood, Fit]] = {}
-    for _ in horizons if starts else ():
+    for _ in horizons:
         for i in alive:
             found[i] = next(runners[i])
         alive = sorted(alive, key=lambda i: found[i][1].point.cost)

@@ -59,6 +59,12 @@ class Response:
         )
         return np.flatnonzero(~held)
 
+    @property
+    def launches(self) -> Floats:
+        """(E, D, l) change of the residual by an episode's launch, in standard deviations of its prior."""
+        linear = self.fit.linear
+        return linear.launch_jacobian.reshape(len(linear.residual), linear.residual[0].size, -1)
+
     @cached_property
     def tangent(self) -> Tangent:
         """Beside the parameters stand the engine's approximations, as nuisances; the time step's of each episode too
@@ -73,7 +79,7 @@ class Response:
         return Tangent(
             residual=linear.residual.reshape(rows),
             parameters=np.concatenate([linear.jacobian.reshape(*rows, -1)[:, :, self.inside], engine], axis=2),
-            own=np.concatenate([linear.launch_jacobian.reshape(*rows, -1), by_chance], axis=2),
+            own=np.concatenate([self.launches, by_chance], axis=2),
             pushes=self.pushes.reshape(*rows, -1),
             away=np.append(known, np.zeros(engine.shape[2])),
             own_away=np.pad(-launches_away(likelihood, point), ((0, 0), (0, by_chance.shape[2]))),
@@ -242,7 +248,7 @@ class Response:
             predicted = sensing(lambda _: plain, of, context)(likelihood.time_s)
             there = np.nan_to_num(likelihood.difference(predicted, likelihood.measured) / likelihood.sigma)
             begins = (wider.truly(np.concatenate([values, of], axis=1), told) - read)[:, random] / std[random]
-            moved = (self.tangent.own[:, :, : begins.shape[1]] @ begins[:, :, None])[..., 0]
+            moved = (self.launches @ begins[:, :, None])[..., 0]
             return np.asarray(there.reshape(len(plain), -1) - self.tangent.residual + moved)
 
         return change

@@ -99,14 +99,13 @@ def information(response: Response, candidates: Sequence[Candidate]) -> Informat
             columns.extend(Column(i, case, q) for q in quantities)
             tangents.append(of_case * np.array([q.scale for q in quantities]))
     weight = np.sqrt(robust_weight(response.tangent.residual, response.tangent.robust))[:, :, None]
-    own = response.tangent.own[:, :, : response.fit.linear.launch_jacobian.shape[3]]  # launches, no nuisances
     free, likelihood = response.fit.free[response.inside], response.likelihood
     return Information(
         candidates=tuple(candidates),
         columns=tuple(columns),
         parameters=tuple(likelihood.parameters[i] for i in free),
         width=likelihood.prior_std[free],
-        gram=information_of(np.concatenate(tangents, axis=2) * weight, own * weight),
+        gram=information_of(np.concatenate(tangents, axis=2) * weight, response.launches * weight),
         correlation_time=likelihood.correlation_time,
     )
 

@@ -37,7 +37,7 @@ def cause(response: Response) -> str:
 
 def without_nuisances(response: Response) -> Tangent:
     """The tangent with the parameters and launches alone."""
-    kept, own = len(response.inside), response.fit.linear.launch_jacobian.shape[-1]
+    kept, own = len(response.inside), response.launches.shape[2]
     tangent = response.tangent
     return replace(
         tangent,
@@ -79,7 +79,7 @@ def test_a_contact_falls_into_a_step_by_chance() -> None:
         shots.append(other.observe(simulator().defaults[None], shot[None], time[None])[0])
     response = response_of(replace(clean, measured=np.stack(shots)))
     plain, tangent = Hypothesis((), response.simulator, response.likelihood, response.fit), response.tangent
-    launches = response.fit.linear.launch_jacobian.shape[-1]
+    launches = response.launches.shape[2]
     common = replace(tangent, own=tangent.own[:, :, :launches], own_away=tangent.own_away[:, :launches])
     assert plain.free.log - plain.free.alone < 0
     assert evidences(tangent, [None])[0].log > evidences(common, [None])[0].log + 1000
