@@ -12,7 +12,6 @@ import numpy as np
 from compass_ros.cells import Cell
 from compass_ros.cells.drives import Drive, Drives
 from compass_ros.cells.dynamics import Dynamics
-from compass_ros.cells.rotors import rotors
 from compass_ros.cells.sensors import units_of
 from compass_ros.cells.signals import Signal
 from compass_ros.cells.start import input_names, positions_in_state
@@ -118,9 +117,6 @@ class Physics:
             self.of_cell(values), self.truly(values, self.of_command(inputs))
         )
         self.drives.begin(start[:, 1 : 1 + nq], self.of_cell(values), self.of_command(inputs), self.bank)
-        for joint, rotor in rotors(self.model):  # in the middle of its play
-            for first, places in ((1, self.model.jnt_qposadr), (1 + nq, self.model.jnt_dofadr)):
-                start[:, first + places[rotor]] = start[:, first + places[joint]]
         return start
 
     @cached_property

@@ -11,6 +11,7 @@ from mujoco.rollout import Rollout
 
 from compass_ros.simulation.native.program import Programs
 from compass_ros.simulation.physics import Physics
+from compass_ros.simulation.rotors import carry
 from compass_ros.simulation.warned import Warned
 from compass_ros.types import Floats
 
@@ -46,6 +47,15 @@ class Player:
         for model in models:
             mujoco.mj_setConst(model, self._scratch)
         return models
+
+    def carry(self, physics: Physics, values: Floats, start: Floats) -> None:
+        """Put rotors where they carry what their joints hold, in (B, s) states at the start."""
+        models = self.written(physics, values)
+        with self.warned.counting(), Programs(models, physics.terms(values)):
+            for model, state in zip(models, start, strict=True):
+                mujoco.mj_setState(model, self._scratch, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+                carry(model, self._scratch)
+                mujoco.mj_getState(model, self._scratch, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
 
     def play(
         self, physics: Physics, values: Floats, start: Floats, controls: Floats | None, steps: int

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import mujoco
+import numpy as np
 
-from compass_ros.cells.rotors import PREFIX
+from compass_ros.cells.rotors import PREFIX, rotors
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.sites import OF_JOINT, Site
 
 
-def onto_rotor(model: mujoco.MjModel, joint: str, inertia: float, share: float) -> int:
-    """Let what drives a joint, and what measures its effort, act on its rotor of that inertia. Returns the tendon.
+def onto_rotor(model: mujoco.MjModel, joint: str, inertia: float, share: float) -> tuple[int, float]:
+    """Let what drives a joint, and what measures its effort, act on its rotor. Returns the tendon, and its inertia.
 
-    The joint's armature, which stood for the rotor, is smaller by that, and `share` of its damping and dry friction
-    is the rotor's. A second call sets them anew. Raises ConfigError where the scene has no such rotor.
+    The rotor is a part of the joint's armature, which stood for it: at most all of it, so that what is rigid moves as
+    before; where the drawing has none, it is one of its own. `share` of the joint's damping and dry friction is the
+    rotor's. A second call sets them anew. Raises ConfigError where the scene has no such rotor.
     """
     tendon = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, f"{PREFIX}{joint}"))
     if tendon < 0:
@@ -23,13 +25,15 @@ def onto_rotor(model: mujoco.MjModel, joint: str, inertia: float, share: float) 
     efforts = (model.sensor_type == mujoco.mjtSensor.mjSENS_JOINTACTFRC) & (model.sensor_objid == own)
     model.sensor_objid[efforts] = rotor
     one, other = (int(model.jnt_dofadr[j]) for j in (own, rotor))
-    whole = model.dof_armature[one] + model.dof_armature[other]
+    whole = float(model.dof_armature[one] + model.dof_armature[other])
+    if whole > 0:
+        inertia = min(inertia, whole)
     model.dof_armature[other] = inertia
     model.dof_armature[one] = max(whole - inertia, 0.0)
     for lost in (model.dof_damping, model.dof_frictionloss):
         whole = lost[one] + lost[other]
         lost[one], lost[other] = (1 - share) * whole, share * whole
-    return tendon
+    return tendon, inertia
 
 
 def undriven(model: mujoco.MjModel, site: Site) -> str:
@@ -40,3 +44,35 @@ def undriven(model: mujoco.MjModel, site: Site) -> str:
 def _driving(model: mujoco.MjModel, joint: int) -> list[int]:
     """Actuators that act on a joint itself."""
     return [i for i in range(model.nu) if model.actuator_trntype[i] in OF_JOINT and model.actuator_trnid[i, 0] == joint]
+
+
+def carry(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Put the rotors where what is between them and their joints carries what the joints hold at rest, in place.
+
+    A spring is twisted by what gravity, motion and other forces ask; play is at the flank that carries it, or, where
+    dry friction can hold the joint against a smaller load, between the two.
+    """
+    of = rotors(model)
+    for joint, rotor in of:
+        data.qpos[model.jnt_qposadr[rotor]] = data.qpos[model.jnt_qposadr[joint]]
+        data.qvel[model.jnt_dofadr[rotor]] = data.qvel[model.jnt_dofadr[joint]]
+    mujoco.mj_fwdPosition(model, data)
+    mujoco.mj_fwdVelocity(model, data)
+    for joint, rotor in of:
+        own, other = model.jnt_dofadr[joint], model.jnt_dofadr[rotor]
+        tendon = model.tendon(model.joint(rotor).name).id
+        load = float(data.qfrc_bias[own] - data.qfrc_passive[own])
+        holding = float(model.dof_frictionloss[own] + model.dof_frictionloss[other])
+        side = np.clip(load / holding, -1.0, 1.0) if holding > 0 else np.sign(load)
+        twist = _twist(load, float(model.tendon_stiffness[tendon]), float(model.tendon_stiffnesspoly[tendon, 1]))
+        data.qpos[model.jnt_qposadr[rotor]] += model.tendon_lengthspring[tendon, 1] * side + twist
+
+
+def _twist(load: float, stiffness: float, cubic: float) -> float:
+    """At which a spring stiffness x + cubic x^3 carries a load, by Newton's method from beyond; 0: there is none."""
+    if stiffness <= 0:
+        return 0.0
+    x = load / stiffness
+    for _ in range(8):
+        x -= (stiffness * x + cubic * x**3 - load) / (stiffness + 3 * cubic * x**2)
+    return x

@@ -265,8 +265,10 @@ class Simulator:
 
     def begun(self, values: Floats, inputs: Floats, duration: float) -> tuple[Floats, Floats | None, int]:
         """(B, s) states at the start, (B, T, n) what drives MuJoCo for `duration` seconds, and T."""
-        steps = self._steps(duration)
-        return self.physics.start(values, inputs), self.physics.controls(values, inputs, steps), steps
+        start, steps = self.physics.start(values, inputs), self._steps(duration)
+        if self.cell.rotors:
+            self._player.carry(self.physics, values, start)
+        return start, self.physics.controls(values, inputs, steps), steps
 
     def motion(self, values: Floats, inputs: Floats, duration: float) -> Motion:
         """Roll out (B, P) values with (B, A) inputs for `duration` seconds."""

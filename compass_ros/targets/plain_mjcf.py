@@ -219,7 +219,7 @@ def _between(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
         t = model.tendon(tendon.name).id
         tendon.springlength, tendon.range = model.tendon_lengthspring[t], model.tendon_range[t]
         tendon.limited, tendon.solref_limit = int(model.tendon_limited[t]), model.tendon_solref_lim[t]
-        _set_first(tendon, "stiffness", float(model.tendon_stiffness[t]))
+        tendon.stiffness = [model.tendon_stiffness[t], *model.tendon_stiffnesspoly[t]]
         _set_first(tendon, "damping", float(model.tendon_damping[t]))
         for side in (name, f"{PREFIX}{name}"):
             joint, dof = spec.joint(side), int(model.joint(side).dofadr[0])
@@ -229,7 +229,9 @@ def _between(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
         spec.actuators[a].target = model.joint(int(model.actuator_trnid[a, 0])).name
     for s in np.flatnonzero(model.sensor_objid != efforts):
         spec.sensors[s].objname = model.joint(int(model.sensor_objid[s])).name
-    return Said(fitted.attached.effect.name, on, "exact", f"begin with {PREFIX}JOINT at the place of JOINT")
+    return Said(
+        fitted.attached.effect.name, on, "exact", f"begin with {PREFIX}JOINT where it carries JOINT (`rotors.carry`)"
+    )
 
 
 _WITHIN = "where the command reaches no limit"

@@ -8,8 +8,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from compass_ros.cells.rotors import add_rotors, rotors
+from compass_ros.cells.rotors import add_rotors
 from compass_ros.simulation.effects import Attached, Exported, FittedEffect, attach, effect
+from compass_ros.simulation.rotors import carry
 from compass_ros.simulation.sizes import unit_joint
 from compass_ros.targets.plain_mjcf import Command, write_plain
 from compass_ros.types import Floats
@@ -57,8 +58,7 @@ def swing(path: Path, controls: Floats, laws: Exported | None = None) -> Floats:
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
     data.qpos[:2], out = (0.6, -0.4), np.zeros((len(controls), 2))
-    for joint, rotor in rotors(model):
-        data.qpos[model.jnt_qposadr[rotor]] = data.qpos[model.jnt_qposadr[joint]]
+    carry(model, data)
 
     def play() -> Floats:
         for t, told in enumerate(controls):
@@ -141,7 +141,12 @@ def test_what_mjcf_has_no_word_for_is_left_out_and_said(scene: Path, tmp_path: P
 
 
 @pytest.mark.parametrize(
-    ("name", "numbers"), [("backlash", (0.05, 0.02, 0.7)), ("joint_elasticity", (0.004, 0.02, 0.7))]
+    ("name", "numbers"),
+    [
+        ("backlash", (0.05, 0.02, 0.7)),
+        ("joint_elasticity", (0.004, 0.02, 0.7, 0.0)),
+        ("joint_elasticity", (0.004, 0.02, 0.7, 0.3)),
+    ],
 )
 def test_what_is_between_a_motor_and_its_joint_is_plain_mjcf(
     name: str, numbers: tuple[float, ...], tmp_path: Path

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from compass_ros.cells.rotors import rotors
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.effects.effect import Context, restore, table_friction
 from compass_ros.simulation.effects.exported import Exported, FittedEffect
 from compass_ros.simulation.native.program import Programs, Term
+from compass_ros.simulation.rotors import carry
 from compass_ros.simulation.sites import Places
 
 
@@ -39,7 +39,7 @@ def attach(model: mujoco.MjModel, data: mujoco.MjData, exported: Exported) -> At
 
     Keep what is returned as long as the model is stepped. Raises ConfigError, and leaves the model as it was, for
     effects of the command or of the sensor, which act outside the model, where the model lacks an object, and where it
-    has effects attached already. A motor's side of a joint (`cells/rotors.py`) starts where its joint is in `data`.
+    has effects attached already. A motor's side of a joint (`cells/rotors.py`) starts where it carries its load.
     """
     places = Places(model, frozenset(exported.sliding))
     acting = [(fitted, _context(places, exported, fitted)) for fitted in exported.effects]
@@ -53,10 +53,8 @@ def attach(model: mujoco.MjModel, data: mujoco.MjData, exported: Exported) -> At
     except ConfigError:
         restore(model, before)
         raise
-    for joint, rotor in rotors(model):
-        data.qpos[model.jnt_qposadr[rotor]] = data.qpos[model.jnt_qposadr[joint]]
-        data.qvel[model.jnt_dofadr[rotor]] = data.qvel[model.jnt_dofadr[joint]]
     mujoco.mj_setConst(model, copy.copy(data))
+    carry(model, data)
     mujoco.mj_forward(model, data)
     return Attachment(model, before, programs)
 

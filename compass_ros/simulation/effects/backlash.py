@@ -2,8 +2,8 @@
 
 tau = 0 while |theta - q| < play / 2, and beyond whatever keeps it from being more, without bouncing; theta the motor's
 angle behind the gear, rotor theta'' = drive - tau. Zero play is absent: motor and joint are one. `rotor` is a part of
-the joint's armature, as far as it has one, and `share` of its damping and dry friction is the motor's. An episode
-begins in the middle of the play.
+the joint's armature, where the drawing has one, and `share` of its damping and dry friction is the motor's. An episode
+begins at the flank that carries the joint's load at rest; where dry friction can hold that, between the two.
 Source: Nordin and Gutman 2002, dead-zone model with stiff flanks. In MuJoCo: a second joint, and a tendon with limits
 between them; with an elasticity beside it, a spring with a dead band.
 """
@@ -28,7 +28,7 @@ def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
     if play <= 0:
         return
     for site in context.sites:
-        tendon = onto_rotor(model, site.name, rotor, share)
+        tendon, _ = onto_rotor(model, site.name, rotor, share)
         model.tendon_lengthspring[tendon] = model.tendon_range[tendon] = (-0.5 * play, 0.5 * play)
         model.tendon_solref_lim[tendon] = (_STIFF_STEPS * model.opt.timestep, 1.0)
         model.tendon_limited[tendon] = model.tendon_stiffness[tendon] == 0

@@ -192,6 +192,7 @@ RESTORED = (
     "tendon_range",
     "tendon_solref_lim",
     "tendon_stiffness",
+    "tendon_stiffnesspoly",
 )
 """Arrays of a model that effects may change, beside the friction cone in its options."""
 

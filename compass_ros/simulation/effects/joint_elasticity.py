@@ -1,11 +1,13 @@
 """A gear or belt that gives way between a motor and its joint.
 
-tau = (theta - q) / compliance + damping (theta' - q') on the joint and its opposite on the motor, theta the motor's
-angle behind the gear, rotor theta'' = drive - tau; damping = 2 x 0.05 sqrt(rotor / compliance). Zero compliance is
-absent: motor and joint are one. `rotor` is a part of the joint's armature, as far as it has one; `share` of the joint's
-damping and dry friction is the motor's.
+tau = twist / compliance (1 + stiffening (twist / compliance)^2) + damping (theta' - q') on the joint and its opposite
+on the motor, twist = theta - q, theta the motor's angle behind the gear, rotor theta'' = drive - tau; damping = 2 x
+0.05 sqrt(rotor / compliance). Zero compliance is absent: motor and joint are one. `rotor` is a part of the joint's
+armature, where the drawing has one; `share` of the joint's damping and dry friction is the motor's. An episode begins
+with the spring as the joint's load at rest twists it.
 Source: Spong 1987, flexible-joint robots; 0.05 of critical damping is usual in geared and belt drives (Albu-Schaeffer,
-Ott and Hirzinger 2007). In MuJoCo: a second joint, and a tendon with stiffness between them.
+Ott and Hirzinger 2007); harmonic drives stiffen as a cubic (Tuttle and Seering 1996), to the double at most within what
+they carry. In MuJoCo: a second joint, and a tendon with stiffness between them.
 """
 
 from __future__ import annotations
@@ -20,31 +22,37 @@ from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize, unit_joint
 from compass_ros.types import Floats
 
 _DAMPING_RATIO = 0.05
-_SOFTEST = 0.25
-"""The step times the highest frequency of the motor on its spring, in which MuJoCo's integrator is still right: what is
-stiffer is taken for so stiff. Semi-implicit steps are stable below 2 and 0.3 % off in frequency here. The implicit ones
-leave out damping between two trees of bodies, as if either side were heavier by damping x step: here 2.5 % of the
-rotor, and less for what is softer."""
+_FASTEST = 0.5
+"""The step times the frequency of motor and joint on their spring, up to which a spring is stiffer: what is stiffer yet
+is taken for so stiff. Semi-implicit steps are stable below 2; here the spring bends under a load as it should and its
+own swing is 1 % too fast, at 0.5 / (2 pi step) = 40 Hz of 2 ms, twice that where the joint is light. The implicit ones
+leave out damping between two trees of bodies, as if either side were heavier by damping x step: here 5 % of the rotor,
+and less for what is softer."""
 
 
 def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
-    compliance, rotor, share = numbers
+    compliance, rotor, share, stiffening = numbers
     if compliance <= 0:
         return
     for site in context.sites:
-        tendon = onto_rotor(model, site.name, rotor, share)
-        stiffness = min(1 / compliance, rotor * (_SOFTEST / model.opt.timestep) ** 2)
+        tendon, inertia = onto_rotor(model, site.name, rotor, share)
+        joint = 1 / model.dof_invweight0[model.joint(site.name).dofadr[0]]
+        both = inertia * joint / (inertia + joint)
+        stiffness = min(1 / compliance, both * (_FASTEST / model.opt.timestep) ** 2)
         model.tendon_stiffness[tendon] = stiffness
-        model.tendon_damping[tendon] = 2 * _DAMPING_RATIO * np.sqrt(rotor * stiffness)
+        model.tendon_stiffnesspoly[tendon, 1] = stiffening * stiffness**3
+        model.tendon_damping[tendon] = 2 * _DAMPING_RATIO * np.sqrt(inertia * stiffness)
         model.tendon_limited[tendon] = 0
 
 
 def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
     """What gives way by the whole travel under the joint's own force would be no gear."""
-    most = size.spread / size.force
+    most, load = size.spread / size.force, size.force**-2
+    squared = " ".join(f"{unit}^2" for unit in size.force_unit.split())
     return (
         Quantity("compliance", f"{size.length_unit}/{size.force_unit}", 0.0, LARGEST * most, MODEST * most),
         *rotor_of(size),
+        Quantity("stiffening", f"1/{squared}", 0.0, load, 0.1 * load, amplitude=False, later=True),
     )
 
 

@@ -61,17 +61,32 @@ def test_an_elastic_joint_is_two_masses_and_a_spring(tmp_path: Path, kind: str, 
         drive_torque = KP * (TOLD - q[1]) - KV * v[1] if drive == "position" else TOLD
         return np.array([torque / LINK, (drive_torque - torque) / ROTOR])
 
-    seen = angle(geared(tmp_path, drive, kind=kind), {"joint_elasticity": (compliance, ROTOR, 0.0)}, kind=kind)
+    seen = angle(geared(tmp_path, drive, kind=kind), {"joint_elasticity": (compliance, ROTOR, 0.0, 0.0)}, kind=kind)
     expected = flown(formula, np.array([0.2, 0.2]), np.zeros(2), SECONDS, 2000)[0]
     rigid = angle(geared(tmp_path, drive, kind=kind), {}, kind=kind)
     assert np.abs(seen[:, 0] - rigid[:, 0]).max() > 2e-3
     assert seen[-1, 0] == pytest.approx(expected, abs=2e-3 * abs(expected) + 5e-4)
 
 
+@pytest.mark.parametrize("stiffening", [0.0, 4.0, 40.0])
+def test_a_gear_stiffens_as_a_cubic(tmp_path: Path, stiffening: float) -> None:
+    compliance = 0.2
+    damping = 0.1 * np.sqrt(ROTOR / compliance)
+
+    def formula(t: float, q: Floats, v: Floats) -> Floats:
+        spring = (q[1] - q[0]) / compliance
+        torque = spring * (1 + stiffening * spring**2) + damping * (v[1] - v[0])
+        return np.array([torque / LINK, (TOLD - torque) / ROTOR])
+
+    seen = angle(geared(tmp_path, "motor"), {"joint_elasticity": (compliance, ROTOR, 0.0, stiffening)})[-1, 0]
+    expected = flown(formula, np.array([0.2, 0.2]), np.zeros(2), SECONDS, 2000)[0]
+    assert seen == pytest.approx(expected, abs=2e-3 * abs(expected) + 5e-4)
+
+
 def test_a_stiff_gear_is_a_rigid_one(tmp_path: Path) -> None:
     cell = geared(tmp_path)
     rigid = angle(cell, {})
-    for name, numbers in (("joint_elasticity", (1e-5, ROTOR, 0.0)), ("backlash", (1e-7, ROTOR, 0.0))):
+    for name, numbers in (("joint_elasticity", (1e-5, ROTOR, 0.0, 0.0)), ("backlash", (1e-7, ROTOR, 0.0))):
         assert np.abs(angle(cell, {name: numbers})[:, 0] - rigid[:, 0]).max() < 3e-3
 
 
@@ -117,7 +132,7 @@ def test_friction_is_shared_with_the_motor(tmp_path: Path, share: float) -> None
 
     cell = geared(tmp_path, "motor")
     law = Attached(effect("joint_elasticity").at(unit_joint("hinge")), ("axis",))
-    values = np.array([[lost, compliance, ROTOR, share]])
+    values = np.array([[lost, compliance, ROTOR, share, 0.0]])
     seen = Simulator(cell, [law], threads=1).motion(values, np.array([[TOLD, 0.2]]), SECONDS).positions[0, -1, 0]
     expected = flown(formula, np.array([0.2, 0.2]), np.zeros(2), SECONDS, 2000)[0]
     assert seen == pytest.approx(expected, abs=2e-3 * abs(expected) + 5e-4)
@@ -143,28 +158,56 @@ def test_a_motor_that_sticks_holds_its_joint_within_the_play(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("name", ["joint_elasticity", "backlash"])
 def test_the_measured_effort_is_the_motors(tmp_path: Path, name: str) -> None:
-    seen = angle(geared(tmp_path, "motor"), {name: (0.05, ROTOR, 0.0)})
+    numbers = (0.05, ROTOR, 0.0, 0.0) if name == "joint_elasticity" else (0.05, ROTOR, 0.0)
+    seen = angle(geared(tmp_path, "motor"), {name: numbers})
     np.testing.assert_allclose(seen[5:, 1], TOLD)
 
 
-@pytest.mark.parametrize("armature", [0.0, ROTOR, 3 * ROTOR])
+@pytest.mark.parametrize("armature", [0.0, 0.3 * ROTOR, ROTOR, 3 * ROTOR])
 def test_the_rotor_is_a_part_of_the_armature(tmp_path: Path, armature: float) -> None:
-    """So that a stiff gear moves what was moved before, unless the motor has more than the armature said.
+    """So that a stiff gear moves what was moved before, unless the drawing had none.
 
-    But for the inertia that damping between two trees of bodies is to an implicit integrator: 2 x 2.5 % of the rotor.
+    But for the inertia that damping between two trees of bodies is to an implicit integrator: 2 x 5 % of the rotor.
     """
-    seen = angle(geared(tmp_path, "motor", armature), {"joint_elasticity": (1e-4, ROTOR, 0.0)})[-1, 0]
-    inertia = LINK + max(armature, ROTOR)
-    assert seen == pytest.approx(0.2 + 0.5 * TOLD / inertia * SECONDS**2, rel=0.05 * ROTOR / inertia + 1e-3)
+    seen = angle(geared(tmp_path, "motor", armature), {"joint_elasticity": (1e-4, ROTOR, 0.0, 0.0)})[-1, 0]
+    inertia = LINK + (armature or ROTOR)
+    assert seen == pytest.approx(0.2 + 0.5 * TOLD / inertia * SECONDS**2, rel=0.1 * ROTOR / inertia + 1e-3)
 
 
 def test_play_beside_an_elasticity_is_a_spring_with_a_dead_band(tmp_path: Path) -> None:
     """In either order."""
-    numbers = {"joint_elasticity": (0.05, ROTOR, 0.0), "backlash": (0.1, ROTOR, 0.0)}
+    numbers = {"joint_elasticity": (0.05, ROTOR, 0.0, 0.0), "backlash": (0.1, ROTOR, 0.0)}
     cell = geared(tmp_path)
     both = angle(cell, numbers)
     np.testing.assert_array_equal(both, angle(cell, dict(reversed(numbers.items()))))
-    assert np.abs(both - angle(cell, {"joint_elasticity": (0.05, ROTOR, 0.0)}))[:, 0].max() > 5e-3
+    assert np.abs(both - angle(cell, {"joint_elasticity": (0.05, ROTOR, 0.0, 0.0)}))[:, 0].max() > 5e-3
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5, 20.0])
+def test_an_arm_that_rests_begins_with_its_gear_loaded(tmp_path: Path, friction: float) -> None:
+    """A servo holds an arm that weighs 2 N m on a gear: it stays where it was measured, but for what the motor sinks.
+
+    With dry friction on the joint's side, play is at the flank below the arm, or in between where friction holds it.
+    """
+    weight, compliance, play = 2.0, 0.02, 0.1
+    scene = f"""<mujoco><option timestep="5e-4" gravity="0 0 -{weight}" integrator="implicitfast"/><worldbody><body>
+        <joint name="axis" type="slide" axis="0 0 1" armature="{ROTOR}" frictionloss="{friction}"/>
+        <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>
+        <actuator><position name="d" joint="axis" kp="1e4" kv="100"/></actuator></mujoco>"""
+    ctrl = {"name": "u", "unit": "m", "low": -1.0, "high": 1.0, "field": "ctrl", "of": "d"}
+    first = {"name": "q", "unit": "m", "low": -1.0, "high": 1.0, "field": "qpos", "of": "axis"}
+    objects = [{"name": "axis", "quantity": "joint"}]
+    damping = parameter("axis@dyna@damping", "dof_damping", "axis", 0.0, 0.001)
+    cell = written(tmp_path, scene, content(objects, [damping], action=[ctrl, first], factors=["axis"]))
+    cubic, flank = 0.5, 0.5 * play * min(weight / (friction or 1e-9), 1)
+    spring = float(np.roots([cubic, 0, 1, -weight])[-1].real)  # spring + cubic spring^3 = weight
+    for numbers, twist in (
+        ({"joint_elasticity": (compliance, ROTOR, 0.0, 0.0)}, weight * compliance),
+        ({"joint_elasticity": (compliance, ROTOR, 0.0, cubic)}, spring * compliance),
+        ({"backlash": (play, ROTOR, 0.0)}, flank),
+    ):
+        seen = angle(cell, numbers, told=0.2 + twist, kind="slide")[:, 0]
+        assert np.abs(seen - 0.2).max() < 1.5e-3
 
 
 def test_a_joint_that_nothing_drives_has_no_gear(tmp_path: Path) -> None:
