@@ -82,6 +82,7 @@ def assemble(
         warnings=(*found.warnings, *simulator.warnings),
         unit=simulator.unit,
         together=estimate.together,
+        time_step_s=cell.time_step,
     )
 
 

@@ -42,7 +42,20 @@ def calibrate(
     """Which parameters, which values, what is left. Raises DataError where the recordings cannot answer.
 
     The same episodes, cell and configuration give the same result, bit for bit. Wall time is for the caller to add.
+    Where the simulator's time step is what is missing, all is done anew with a shorter one.
     """
+    done = _calibrate(episodes, cell, config, report, keep)
+    if (shorter := done[1].shorter_s) is None:
+        return done
+    result, found = _calibrate(episodes, replace(cell, time_step=shorter), config, report, keep)
+    said = f"simulated with time steps of {1e3 * shorter:g} ms, which the scene should have"
+    why = "with its own, contacts are others than in the recordings"
+    return replace(result, warnings=(f"{said}: {why}", *result.warnings)), found
+
+
+def _calibrate(
+    episodes: Sequence[Episode], cell: Cell, config: CalibrationConfig, report: Report, keep: Keep | None
+) -> tuple[Result, Discovery]:
     checked = check(cell, episodes)
     sound, without_motion = usable(cell, checked.episodes)
     used, steady = evenly(sound, config.episodes), Steady(report)

@@ -531,3 +531,5 @@ class Result:
     """Recordings that were named and could not be used."""
     together: tuple[Together, ...] = ()
     """Parameters that are told only together."""
+    time_step_s: float | None = None
+    """Of the simulation, where it is not the scene's."""

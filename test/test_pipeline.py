@@ -13,10 +13,12 @@ from compass_ros.assembly import assemble
 from compass_ros.calibration.noise import Noise, measure_noise
 from compass_ros.cells import load
 from compass_ros.config import CalibrationConfig
-from compass_ros.discovery import Discovery, not_evaluated
+from compass_ros.discovery import Discovery, fit_failed, not_evaluated
 from compass_ros.errors import DataError
 from compass_ros.pipeline import calibrate
 from compass_ros.posing import Posed, launched, noise_floor
+from compass_ros.reporting.from_json import from_json
+from compass_ros.reporting.result_json import to_json
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import Replay, recordings
 from compass_ros.types import Episode, Estimate, Progress, Result, Track
@@ -175,6 +177,28 @@ def test_a_search_that_cannot_be_done_leaves_the_calibration(
     assert found(ended) == found(result)
     assert (ended.mismatch.verdict, "\n" in ended.mismatch.sentence) == (verdict, False)
     assert says in ended.mismatch.sentence
+
+
+def test_with_a_shorter_step_all_is_done_anew(
+    episodes: list[Episode], result: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its fit is that of the shorter step, its gaps too, and what is written says so."""
+    steps: list[float] = []
+
+    def discover(simulator: Simulator, *_: object) -> Discovery:
+        steps.append(simulator.time_step)
+        return fit_failed("the step is too long", 0.25 * steps[0]) if len(steps) == 1 else not_evaluated("it was asked")
+
+    monkeypatch.setattr(pipeline, "refine", lambda *_: None)
+    monkeypatch.setattr(pipeline, "discover", discover)
+    ended, found_last = calibrate(episodes, cell(), replace(CONFIG, discover=True))
+    assert steps == [steps[0], 0.25 * steps[0]]
+    assert ended.time_step_s == 0.25 * steps[0]
+    assert found_last.mismatch.verdict == ended.mismatch.verdict == "not_evaluated"
+    assert ended.warnings[0].startswith(f"simulated with time steps of {250 * steps[0]:g} ms")
+    assert ended.gap["nominal"] != result.gap["nominal"]
+    assert from_json(to_json(ended)).time_step_s == ended.time_step_s
+    assert result.time_step_s is None
 
 
 @pytest.mark.parametrize("error", [RuntimeError("a bug"), KeyboardInterrupt(), MemoryError()])

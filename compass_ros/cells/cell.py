@@ -25,6 +25,8 @@ class Cell:
     hash: str
     rotors: tuple[str, ...] = ()
     """Joints whose motors are bodies of their own in the compiled scene (`cells/rotors.py`)."""
+    time_step: float | None = None
+    """Of the simulation where it is not the scene's [s]."""
 
     @property
     def name(self) -> str:

@@ -16,7 +16,7 @@ from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.floor import left_open
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.neighbours import rank
-from compass_ros.discovery.numerics import numerics_as_model
+from compass_ros.discovery.numerics import numerics_as_model, shorter_step
 from compass_ros.discovery.objections import frame_rate, objections
 from compass_ros.discovery.odds import Prior
 from compass_ros.discovery.search import Tell, search
@@ -87,6 +87,8 @@ def weigh(
     best = max([found.unknown, *found.odds])
     if best > threshold and (cause := numerics_as_model(plain, best)):
         return fit_failed(f"{cause}, which is the simulator's numerics and not physics")
+    if best > threshold and simulator.cell.time_step is None and (step := shorter_step(plain, best, threshold)):
+        return fit_failed(f"what is left goes away with time steps of {1e3 * step:g} ms", step)
     tell("weigh effects", 0.95)
     said = Judge(found, held_out, noise, alpha, threshold, odds, undetectable(first), seed, warnings).discovery()
     if said.mismatch.verdict != "none":

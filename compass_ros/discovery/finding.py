@@ -65,6 +65,8 @@ class Discovery:
     """Explanations of known laws, and that nothing is missing, down to a hundredth of the probability."""
     open_sigma: float = 0.0
     """What the parameters' error bars leave open in held-out episodes, over the noise."""
+    shorter_s: float | None = None
+    """A time step [s] with which the simulator explains more as it is than with any law or discrepancy."""
 
 
 def not_evaluated(reason: str) -> Discovery:
@@ -72,9 +74,10 @@ def not_evaluated(reason: str) -> Discovery:
     return Discovery(Mismatch("not_evaluated", None, (), (), "", f"Missing physics was not looked for: {reason}."))
 
 
-def fit_failed(reason: str) -> Discovery:
+def fit_failed(reason: str, shorter_s: float | None = None) -> Discovery:
     """No verdict, for a fit of the search went wrong."""
-    return Discovery(Mismatch("fit_failed", None, (), (), "", f"No verdict on missing physics: {reason}."))
+    mismatch = Mismatch("fit_failed", None, (), (), "", f"No verdict on missing physics: {reason}.")
+    return Discovery(mismatch, shorter_s=shorter_s)
 
 
 def data_bad(sentence: str) -> Discovery:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +82,8 @@ def current(cell: Cell, version: Path | None = None, threads: int = 0) -> Curren
         simulator = Simulator(cell, threads=threads)
         return Current(simulator, simulator.defaults)
     where = str(version / "result.json")
-    rows = read_result(version / "result.json", cell.name)["parameters"]
+    result = read_result(version / "result.json", cell.name)
+    rows, cell = result["parameters"], replace(cell, time_step=result.get("time_step_s"))
     own = {p.name for p in cell.parameters}
     if any(row["name"] not in own for row in rows):
         cell = with_auto(cell)  # calibrated with `--parameters auto`

@@ -54,6 +54,7 @@ def from_json(content: Json) -> Result:
         noise_floor_m=_number(gap["noise_floor_m"]),
         unit=gap.get("unit", "m"),
         cell_file=content.get("cell_file", ""),
+        time_step_s=content.get("time_step_s"),
         parameters=tuple(_parameter(row) for row in content["parameters"]),
         together=tuple(Together(tuple(g["parameters"]), g["ratios"]) for g in content.get("together", ())),
         graph=Graph(

@@ -175,6 +175,7 @@ def to_json(result: Result) -> dict[str, Any]:
         "seed": int(result.seed),
         "cancelled": bool(result.cancelled),
         "warnings": list(result.warnings),
+        **({} if result.time_step_s is None else {"time_step_s": result.time_step_s}),
         "versions": dict(sorted(result.versions.items())),
         "budget": {
             "rollouts": int(result.budget.rollouts),

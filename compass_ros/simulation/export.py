@@ -35,6 +35,7 @@ def write_scene(cell: Cell, values: Floats, path: Path) -> None:
     """
     spec = scene_source(cell.model_path).spec
     add_rotors(spec, cell.rotors)
+    spec.option.timestep = cell.time_step or spec.option.timestep
     spec.compiler.saveinertial = True  # else MuJoCo computes masses from the drawing again
     spec.comment = spec.comment.replace("--", "- -")  # MuJoCo reads that, XML has no such comment
     model = _calibrated(spec, cell, values)

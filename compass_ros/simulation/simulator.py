@@ -66,7 +66,8 @@ class Simulator:
     ) -> None:  # fmt: skip
         """`options`: MuJoCo's numerics (`timestep`, `cone`, `solver`, ...) where they are not to be the scene's.
         `softness`: what is left of the regularisation of joints' dry friction, or of contacts (`set_numerics`)."""
-        self._numerics = partial(set_numerics, options=options or {}, softness=softness or {})
+        of_cell = {} if cell.time_step is None else {"timestep": cell.time_step}
+        self._numerics = partial(set_numerics, options={**of_cell, **(options or {})}, softness=softness or {})
         dynamics = dynamics_of(cell)
         self._numerics(dynamics.model)
         drives = Drives(cell, dynamics.model)

@@ -18,7 +18,7 @@ from compass_ros.cells import load
 from compass_ros.discovery.evidence import Tangent, evidences
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.nuisances import finite_step, nuisances, stated_errors
-from compass_ros.discovery.numerics import numerics_as_model
+from compass_ros.discovery.numerics import numerics_as_model, shorter_step
 from compass_ros.discovery.planned import perfect
 from compass_ros.discovery.response import Response
 from compass_ros.simulation import Simulator
@@ -83,6 +83,32 @@ def test_a_contact_falls_into_a_step_by_chance() -> None:
     common = replace(tangent, own=tangent.own[:, :, :launches], own_away=tangent.own_away[:, :launches])
     assert plain.free.log - plain.free.alone < 0
     assert evidences(tangent, [None])[0].log > evidences(common, [None])[0].log + 1000
+
+
+def with_step(step: float, by: Simulator) -> Hypothesis:
+    """Shots as another simulator plays them, and the table's simulator at its defaults with steps of its own."""
+    simulator = Simulator(replace(cell(), time_step=step), threads=1)
+    clean = perfect(simulator, CALM, RATE, 0.1 * SIGMA)
+    laws = np.zeros(sum(len(a.effect.quantities) for a in by.effects)) + 0.3
+    values = np.tile(np.append(simulator.defaults, laws), (len(CALM), 1))
+    likelihood, free = replace(clean, measured=by.observe(values, CALM, clean.time_s)), np.arange(2)
+    point = start(likelihood, simulator.defaults)
+    return Hypothesis(
+        (), simulator, likelihood,
+        Fit(point, linearise(likelihood, point, free, np.full(2, 1e-3)), free, 4.0, 0, True),
+    )  # fmt: skip
+
+
+def test_a_step_that_is_too_long_is_said() -> None:
+    """Shots with steps of the scene, played with steps four times as long: the scene's would do; beside a drag none."""
+    step = Simulator(cell()).time_step
+    long, best = with_step(4 * step, Simulator(cell(), threads=1)), 100.0
+    assert long.fit.point.cost > 10 * best
+    assert shorter_step(long, best, 5.0) == pytest.approx(step)
+    assert shorter_step(long, 10 * long.fit.point.cost, 5.0) is None
+    dragged = Simulator(cell(), [Attached(EFFECTS["viscous_drag"], PUCKS)], threads=1)
+    drag = with_step(step, dragged)
+    assert shorter_step(drag, 0.5 * drag.fit.point.cost, 5.0) is None
 
 
 def test_friction_that_holds_where_the_engine_creeps_calls_for_nothing(tmp_path: Path) -> None:

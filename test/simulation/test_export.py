@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -34,6 +35,15 @@ def test_the_written_scene_has_every_number_to_the_last_digit(tmp_path: Path, ca
     different = [n for n in arrays if not np.array_equal(getattr(written, n), getattr(wanted, n))]
     assert set(different) <= ignored
     assert (written.opt.gravity == wanted.opt.gravity).all()
+
+
+def test_a_time_step_that_is_not_the_scenes_is_simulated_and_written(tmp_path: Path, calibrated: Floats) -> None:
+    shorter = replace(cell(), time_step=0.00025)
+    write_scene(shorter, calibrated, tmp_path / "scene.xml")
+    assert mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml")).opt.timestep == 0.00025
+    assert Simulator(shorter, threads=1).time_step == 0.00025
+    assert Simulator(shorter, [Attached(EFFECTS["swirl"], ("puck1",))], threads=1).time_step == 0.00025
+    assert Simulator(shorter, options={"timestep": 0.001}, threads=1).time_step == 0.001
 
 
 @pytest.mark.parametrize("shot", [DESCRIBED, WIDE[1]])
