@@ -23,11 +23,11 @@ from compass_ros.types import Floats
 
 _DAMPING_RATIO = 0.05
 _FASTEST = 0.5
-"""The step times the frequency of motor and joint on their spring, up to which a spring is stiffer: what is stiffer yet
-is taken for so stiff. Semi-implicit steps are stable below 2; here the spring bends under a load as it should and its
-own swing is 1 % too fast, at 0.5 / (2 pi step) = 40 Hz of 2 ms, twice that where the joint is light. The implicit ones
-leave out damping between two trees of bodies, as if either side were heavier by damping x step: here 5 % of the rotor,
-and less for what is softer."""
+"""The step times the frequency of the motor on its spring, up to which a spring is stiffer: what is stiffer yet is
+taken for so stiff. Semi-implicit steps are stable while that of motor and joint together is below 2, so with a rotor
+that is up to 15 times as heavy as its joint; here the spring bends under a load as it should, and the motor's swing is
+1 % too fast, at 0.5 / (2 pi step) = 40 Hz of 2 ms. The implicit ones leave out damping between two trees of bodies, as
+if either side were heavier by damping x step: here 5 % of the rotor, and less for what is softer."""
 
 
 def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
@@ -36,9 +36,7 @@ def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
         return
     for site in context.sites:
         tendon, inertia = onto_rotor(model, site.name, rotor, share)
-        joint = 1 / model.dof_invweight0[model.joint(site.name).dofadr[0]]
-        both = inertia * joint / (inertia + joint)
-        stiffness = min(1 / compliance, both * (_FASTEST / model.opt.timestep) ** 2)
+        stiffness = min(1 / compliance, inertia * (_FASTEST / model.opt.timestep) ** 2)
         model.tendon_stiffness[tendon] = stiffness
         model.tendon_stiffnesspoly[tendon, 1] = stiffening * stiffness**3
         model.tendon_damping[tendon] = 2 * _DAMPING_RATIO * np.sqrt(inertia * stiffness)
