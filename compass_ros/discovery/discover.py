@@ -85,10 +85,11 @@ def weigh(
     tell("fit effects", 0.3)
     found = search(plain, first, asked, threshold, tell)
     best = max([found.unknown, *found.odds])
-    if best > threshold and (cause := numerics_as_model(plain, best)):
-        return fit_failed(f"{cause}, which is the simulator's numerics and not physics")
-    if best > threshold and simulator.cell.time_step is None and (step := shorter_step(plain, best, threshold)):
-        return fit_failed(f"what is left goes away with time steps of {1e3 * step:g} ms", step)
+    if best > threshold:
+        if cause := numerics_as_model(plain, best):
+            return fit_failed(f"{cause}, which is the simulator's numerics and not physics")
+        if simulator.cell.time_step is None and (step := shorter_step(plain, best, threshold)):
+            return fit_failed(f"what is left goes away with time steps of {1e3 * step:g} ms", step)
     tell("weigh effects", 0.95)
     said = Judge(found, held_out, noise, alpha, threshold, odds, undetectable(first), seed, warnings).discovery()
     if said.mismatch.verdict != "none":

@@ -69,7 +69,10 @@ def carry(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 
 def _twist(load: float, stiffness: float, cubic: float) -> float:
-    """At which a spring stiffness x + cubic x^3 carries a load, by Newton's method from beyond; 0: there is none."""
+    """At which a spring stiffness x + cubic x^3 carries a load, by Newton's method from beyond; 0: there is none.
+
+    Eight steps are exact to 1e-12 where the load makes it up to 65 times as stiff as it is slack.
+    """
     if stiffness <= 0:
         return 0.0
     x = load / stiffness

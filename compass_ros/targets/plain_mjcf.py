@@ -229,9 +229,8 @@ def _between(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
         spec.actuators[a].target = model.joint(int(model.actuator_trnid[a, 0])).name
     for s in np.flatnonzero(model.sensor_objid != efforts):
         spec.sensors[s].objname = model.joint(int(model.sensor_objid[s])).name
-    return Said(
-        fitted.attached.effect.name, on, "exact", f"begin with {PREFIX}JOINT where it carries JOINT (`rotors.carry`)"
-    )
+    begin = f"begin with {PREFIX}JOINT as JOINT's load has it: compass_ros.simulation.rotors.carry(model, data)"
+    return Said(fitted.attached.effect.name, on, "exact", begin)
 
 
 _WITHIN = "where the command reaches no limit"
