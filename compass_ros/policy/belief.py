@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from math import nan
 from pathlib import Path
 
 import numpy as np
 from numpy.random import Generator
 
-from compass_ros.errors import DataError
 from compass_ros.simulation import Simulator
-from compass_ros.simulation.effects import Attached, effect
+from compass_ros.simulation.effects import Attached, FittedEffect, as_entry, from_entry
 from compass_ros.types import Floats
 
 Correction = Callable[[Floats, Floats, Floats], Floats]
@@ -73,22 +73,25 @@ def one(simulator: Simulator, values: Floats) -> Belief:
 
 
 def save(belief: Belief, path: Path) -> None:
-    """As JSON, without the correction. Raises DataError for a law whose numbers mean what one scene makes of them."""
-    rows = []
-    for case in belief.cases:
-        for attached in case.simulator.effects:
-            if effect(attached.effect.name) != attached.effect:
-                raise DataError(f"{path}: the law '{attached.effect.name}' is one of its scene, and is not kept")
-        laws = [[a.effect.name, list(a.objects)] for a in case.simulator.effects]
-        rows.append({"share": case.share, "laws": laws, "values": case.values.tolist()})
+    """As JSON, without the correction; laws as in `effects.yaml`, with the numbers of the first draw."""
+    rows = [{"share": c.share, "laws": _laws(c), "values": c.values.tolist()} for c in belief.cases]
     path.write_text(json.dumps(rows), encoding="utf-8")
+
+
+def _laws(case: Case) -> list[dict[str, object]]:
+    at, said = len(case.simulator.cell.parameters), []
+    for attached in case.simulator.effects:
+        own = slice(at, at := at + len(attached.effect.quantities))
+        values = tuple(float(v) for v in case.values[0, own])
+        said.append(as_entry(FittedEffect(attached, values, (nan,) * len(values))))
+    return said
 
 
 def load(path: Path, simulator: Simulator) -> Belief:
     """What `save` has written, for the simulator of the cell without laws."""
 
-    def attached(laws: Sequence[Sequence[object]]) -> list[Attached]:
-        return [Attached(effect(str(name)), tuple(objects)) for name, objects in laws]  # type: ignore[arg-type]
+    def attached(laws: Sequence[Mapping[str, object]]) -> list[Attached]:
+        return [from_entry(law, path).attached for law in laws]
 
     rows = json.loads(path.read_text(encoding="utf-8"))
     return Belief(

@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from compass_ros.cells import load
 from compass_ros.errors import ConfigError
 from compass_ros.policy import belief, one
 from compass_ros.policy.residual import Residual
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, effect
+from compass_ros.simulation.extents import unit_body
 from compass_ros.transfer import campaign, table
 from compass_ros.transfer.experiment import air_hockey, push_i
 from compass_ros.transfer.loop import LoopConfig, run_loop
@@ -67,6 +69,18 @@ def test_a_belief_is_kept_with_its_laws_and_its_shares(tmp_path: Path) -> None:
     np.testing.assert_array_equal(said[0], said[1])
     alone = [one(c.simulator, c.values).observe(command, np.array([1.0]), np.random.default_rng(0)) for c in two.cases]
     assert {int(np.argmin([np.abs(a[i] - said[0][i]).max() for a in alone])) for i in range(8)} == {0, 1}
+
+
+@pytest.mark.parametrize("centred", [False, True])
+def test_a_law_that_has_its_numbers_from_the_scene_is_kept(centred: bool, tmp_path: Path) -> None:
+    plain = Simulator(load("pushed_bar"), threads=1)
+    payload = effect("payload").at(unit_body(centred=centred))
+    simulator = plain.with_effects([Attached(payload, ("bar",))])
+    values = np.concatenate([plain.defaults, [0.02, 0.01, 0.0, 0.0][: len(payload.quantities)]])
+    belief.save(one(simulator, values), tmp_path / "laws.json")
+    (again,) = belief.load(tmp_path / "laws.json", plain).cases
+    assert again.simulator.effects[0].effect.quantities[0].unit == "kg"
+    np.testing.assert_array_equal(again.values, values[None])
 
 
 def test_a_residual_network_learns_an_offset() -> None:

@@ -100,6 +100,17 @@ def _entry(fitted: FittedEffect) -> _Entry:
     )
 
 
+def as_entry(fitted: FittedEffect) -> dict[str, object]:
+    """A law with its values, as `write_effects` says it of one."""
+    said: dict[str, object] = TypeAdapter(_Entry).dump_python(_entry(fitted), mode="json")
+    return said
+
+
+def from_entry(entry: Mapping[str, object], path: Path | str) -> FittedEffect:
+    """What `as_entry` said; `path`: where it was found."""
+    return _fitted(TypeAdapter(_Entry).validate_python(entry), path)
+
+
 def read_effects(path: Path | str) -> Exported:
     """What `write_effects` wrote. Raises ConfigError with one line."""
     try:
