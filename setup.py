@@ -46,7 +46,7 @@ def native() -> list[Extension]:
         if mujoco is None or mujoco.origin is None:
             raise SystemExit("setup.py: compass_ros is compiled against mujoco: pip install -r requirements.lock first")
         found = {"_fields": Path(mujoco.origin).parent / "include"}
-    depends = [str(NATIVE / name) for name in ("pairs.h", "drives.h", "program.py")]
+    depends = [str(NATIVE / name) for name in ("pairs.h", "sliding.h", "drives.h", "program.py")]
     return [
         Extension(
             f"{NAME}.simulation.native.{name}",

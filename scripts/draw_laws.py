@@ -483,7 +483,7 @@ PICTURES: dict[str, Picture] = {
         ball([0.15, 0.0], push=(1.0, 0, 2.0), axes_shown=(0, 2), seconds=0.7), "everything falls slightly to one side"
     ),
     "payload": Picture(
-        pendulum([0.2, 0.0, 0.0, -0.15]),
+        pendulum([0.2, 0.0, 0.0, -0.03]),
         "swings at another pace, sags more where it is held: a weight that the scene lacks",
     ),
     "wind": Picture(

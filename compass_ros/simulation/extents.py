@@ -43,6 +43,10 @@ class BodySize:
     """Whether MuJoCo has compiled it as a body whose mass is at its origin, for good."""
     turns: bool = True
     """Whether its orientation is measured, and so what spin it has."""
+    middle: tuple[float, float] = (0.0, 0.0)
+    """Between the ends of its x and y in the world [m]."""
+    reach: float = 1.0
+    """The larger distance of an end from there; at least its extent [m]."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +119,10 @@ def body_size(model: mujoco.MjModel, site: Site, path: Path, seconds: float, noi
     spin = max(_rms(np.linalg.norm(path.spin, axis=1)), MODEST * speed / extent)
     acceleration = max(float(np.linalg.norm(model.opt.gravity)), speed**2 / spread)
     centred = bool(model.body_simple[body])
-    return BodySize(site.kind, mass, extent, speed, max(float(speeds.max()), speed), spin, acceleration, centred, turns)
+    low, high = path.position[:, :2].min(axis=0), path.position[:, :2].max(axis=0)
+    middle, reach = (low + high) / 2, max(float((high - low).max()) / 2, extent)
+    return BodySize(site.kind, mass, extent, speed, max(float(speeds.max()), speed), spin, acceleration, centred, turns,
+                    (float(middle[0]), float(middle[1])), reach)  # fmt: skip
 
 
 def pair_size(kind: SiteKind, one: tuple[BodySize, Path], other: tuple[BodySize, Path]) -> PairSize:

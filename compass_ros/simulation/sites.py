@@ -277,6 +277,25 @@ class Places:
         return bool(np.any((masks != 0) & (weld[one] != weld[other]) & ~family))
 
 
+def slides_on_what_stands(model: mujoco.MjModel, site: Site) -> str:
+    """Why a body in space cannot slide on anything that stands, with friction; empty: it can, or is another site."""
+    if site.kind != "body":
+        return ""
+    own = model.geom_bodyid == model.body(site.name).id
+    stands = model.body_weldid[model.geom_bodyid] == 0
+    for one, other, dim in zip(model.pair_geom1, model.pair_geom2, model.pair_dim, strict=True):
+        if dim >= _WITH_FRICTION and ((own[one] and stands[other]) or (own[other] and stands[one])):
+            return ""
+    types, answers = model.geom_contype, model.geom_conaffinity
+    meets = (types[own][:, None] & answers[stands]) | (answers[own][:, None] & types[stands])
+    rubs = np.maximum(model.geom_condim[own][:, None], model.geom_condim[stands]) >= _WITH_FRICTION
+    return "" if np.any((meets != 0) & rubs) else "it touches nothing that stands with friction"
+
+
+_WITH_FRICTION = 3
+"""Dimensions of a contact that has friction: MuJoCo's condim."""
+
+
 def slides_in_plane(model: mujoco.MjModel, body: int) -> bool:
     """Whether a body of the world has slides along x and y, perhaps a hinge about z after them, and nothing else."""
     count, own = int(model.body_jntnum[body]), slice(model.body_jntadr[body], None)

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from compass_ros.cells.rotors import PREFIX
-from compass_ros.simulation.effects import Exported, FittedEffect
+from compass_ros.simulation.effects import Exported, FittedEffect, payload
 from compass_ros.simulation.effects.attach import context_in
 from compass_ros.simulation.sites import Places
 from compass_ros.targets.said import Said
@@ -133,8 +133,9 @@ def _payload(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
     given, model = numbers(fitted), spec.compile()
     for name in fitted.attached.objects:
         body, compiled = spec.body(name), model.body(name)
-        place = np.array(compiled.ipos) + [given.get(axis, 0.0) for axis in "xyz"]
-        load = body.add_body(name=f"{name}_payload", pos=place)
+        moment = np.array([given.get(f"moment_{axis}", 0.0) for axis in "xyz"])
+        away = payload.place(model, compiled.id, given["mass"], moment)
+        load = body.add_body(name=f"{name}_payload", pos=np.array(compiled.ipos) + away)
         load.mass, load.ipos, load.inertia = given["mass"], np.zeros(3), np.full(3, _POINT)
         load.explicitinertial = True
     return Said("payload", fitted.attached.objects, "exact")

@@ -15,7 +15,7 @@ import pytest
 from compass_ros.errors import ConfigError
 from compass_ros.reporting.from_json import from_json
 from compass_ros.reporting.result_json import read_result, schema, to_json, write_result
-from compass_ros.types import EffectParameter, ExplainedLaw, Explanation, Gap, Graph, HeldOut, Result, Verdict
+from compass_ros.types import EffectParameter, ExplainedLaw, Explanation, Gap, Graph, HeldOut, Result, SiteWord, Verdict
 
 CONTRACT = {
     "": ("schema", "cell", "seed", "versions", "budget", "episodes", "gap", "parameters", "graph", "mismatch"),
@@ -55,6 +55,11 @@ def valid(content: object) -> bool:
 
 def test_schema_is_a_schema() -> None:
     jsonschema.Draft202012Validator.check_schema(schema())
+
+
+def test_a_site_is_called_as_in_the_code() -> None:
+    words = schema()["$defs"]["where"]["properties"]["site_kind"]["enum"]
+    assert set(words) == {*get_args(SiteWord), None}
 
 
 @pytest.mark.parametrize("verdict", get_args(Verdict))

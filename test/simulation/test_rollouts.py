@@ -92,7 +92,9 @@ def test_an_effect_that_cannot_act_is_refused(effect: str, objects: tuple[str, .
 
 
 def test_friction_on_the_table_is_refused_for_what_does_not_lie_on_it() -> None:
-    with pytest.raises(ConfigError, match=r"no body on the cell's table 'pusher'; it has \['puck1', 'puck2'\]"):
+    with pytest.raises(
+        ConfigError, match=r"no body on the cell's table or moving body 'pusher'; it has \['puck1', 'puck2'\]"
+    ):
         Simulator(cell(), [Attached(EFFECTS["friction_gradient"], ("pusher",))], threads=1)
 
 

@@ -42,7 +42,7 @@ SMOOTH: tuple[tuple[str, tuple[str, ...], tuple[float, ...]], ...] = (
     ("spring", ("shoulder",), (0.5, -0.2, -0.4)),
     ("cogging", ("shoulder",), (0.2, -0.1, 6.0)),
     ("gravity_tilt", ("upper", "lower"), (0.05, -0.03)),
-    ("payload", ("lower",), (0.4, 0.02, 0.01, -0.1)),
+    ("payload", ("lower",), (0.4, 0.008, 0.004, -0.04)),
 )
 DRY: tuple[tuple[str, tuple[str, ...], tuple[float, ...]], ...] = (
     ("coulomb_friction", ("elbow",), (0.1,)),

@@ -76,7 +76,7 @@ def test_a_law_that_has_its_numbers_from_the_scene_is_kept(centred: bool, tmp_pa
     plain = Simulator(load("pushed_bar"), threads=1)
     payload = effect("payload").at(unit_body(centred=centred))
     simulator = plain.with_effects([Attached(payload, ("bar",))])
-    values = np.concatenate([plain.defaults, [0.02, 0.01, 0.0, 0.0][: len(payload.quantities)]])
+    values = np.concatenate([plain.defaults, [0.02, 0.0002, 0.0, 0.0][: len(payload.quantities)]])
     belief.save(one(simulator, values), tmp_path / "laws.json")
     (again,) = belief.load(tmp_path / "laws.json", plain).cases
     assert again.simulator.effects[0].effect.quantities[0].unit == "kg"

@@ -1,8 +1,10 @@
 """A mass that the scene lacks: what a gripper holds, a load, a housing.
 
-The body grows by a point `mass` at (x, y, z) from its centre of mass, in its own frame: weight, inertia and centre of
-mass follow. On an arm it belongs on the last link. MuJoCo compiles a body whose mass is at its origin as centred for
-good; on such a one the mass is at the centre. Source: rigid-body dynamics, parallel axes.
+The body grows by a point `mass` at (moment_x, moment_y, moment_z) / mass from its centre of mass, in its own frame:
+weight, inertia and centre of mass follow. First moments of mass are what motion is linear in (base parameters:
+Atkeson, An and Hollerbach 1986); a place is not known where the mass is not. Its inertia is that of a lump within three
+extents of the body. On an arm it belongs on the last link. MuJoCo compiles a body whose mass is at its origin as centred
+for good; on such a one the mass is at the centre. Source: rigid-body dynamics, parallel axes.
 """
 
 from __future__ import annotations
@@ -21,18 +23,22 @@ _REACH = 3.0
 
 
 def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
-    added = float(numbers[0])
-    offset = np.zeros(3)
-    offset[: len(numbers) - 1] = numbers[1:]
-    for site in context.sites if added else ():
+    moment = np.zeros(3)
+    moment[: len(numbers) - 1] = numbers[1:]
+    for site in context.sites if numbers.any() else ():
         body = model.body(site.name).id
-        own = float(model.body_mass[body])
-        model.body_mass[body] = own + added
-        if offset.any():
-            _off_centre(model, body, offset, own, added)
+        if moment.any():
+            _off_centre(model, body, float(numbers[0]), moment)
+        model.body_mass[body] += numbers[0]
 
 
-def _off_centre(model: mujoco.MjModel, body: int, offset: Floats, own: float, added: float) -> None:
+def place(model: mujoco.MjModel, body: int, mass: float, moment: Floats) -> Floats:
+    """(3,) where a load is, from the body's centre of mass [m]; at most as far as one may be."""
+    extent = float(np.sqrt(model.body_inertia[body].sum() / (2 * model.body_mass[body])))
+    return np.asarray(moment / max(mass, float(np.linalg.norm(moment)) / (_REACH * extent), 1e-300))
+
+
+def _off_centre(model: mujoco.MjModel, body: int, added: float, moment: Floats) -> None:
     """Centre and moments of inertia, with the axes of the largest first as MuJoCo has them."""
     if model.body_simple[body]:
         raise ConfigError(
@@ -42,23 +48,24 @@ def _off_centre(model: mujoco.MjModel, body: int, offset: Floats, own: float, ad
     turn = np.zeros(9)
     mujoco.mju_quat2Mat(turn, model.body_iquat[body])
     axes = turn.reshape(3, 3)
+    own, offset = float(model.body_mass[body]), place(model, body, added, moment)
     reduced = own * added / (own + added)
     tensor = axes @ np.diag(model.body_inertia[body]) @ axes.T
     tensor += reduced * (offset @ offset * np.eye(3) - np.outer(offset, offset))
     moments, columns = np.linalg.eigh(tensor)
     columns = columns[:, ::-1]
     columns[:, 2] = np.cross(columns[:, 0], columns[:, 1])
-    model.body_ipos[body] += offset * added / (own + added)
+    model.body_ipos[body] += moment / (own + added)
     model.body_inertia[body] = moments[::-1]
     mujoco.mju_mat2Quat(model.body_iquat[body], np.ascontiguousarray(columns).ravel())
     model.body_sameframe[body] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
 
 
 def _on_body(size: BodySize) -> tuple[Quantity, ...]:
-    reach = _REACH * size.extent
     mass = Quantity("mass", "kg", 0.0, LARGEST * size.mass, MODEST * size.mass)
-    places = [Quantity(axis, "m", -reach, reach, size.extent, amplitude=False, grid=3) for axis in "xyz"]
-    return (mass,) if size.centred else (mass, *places)
+    most, modest = (share * size.mass * size.extent for share in (LARGEST, MODEST))
+    moments = [Quantity(f"moment_{axis}", "kg m", -most, most, modest) for axis in "xyz"]
+    return (mass,) if size.centred else (mass, *moments)
 
 
 EFFECT = Effect(

@@ -3,13 +3,16 @@
 F = -extra exp(-(v / speed)^2) N v / |v| on top of the ordinary friction; on a joint `extra` is a torque [N m].
 Source: Stribeck curve in the form of Armstrong-Helouvry 1994, Gaussian exponent 2. The speeds of contacts are below
 0.1 m/s there; with more than 0.3 m/s it is no friction of low speeds: a drag that falls at speed looks like that.
+On a body in space the coefficient of each of its contacts with what stands is larger by extra exp(-(v / speed)^2), v
+the slip there; with `extra` below zero it grows with speed.
 """
 
 from __future__ import annotations
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity, friction
+from compass_ros.simulation.extents import BodySize
 from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.simulation.sites import JOINTS, LYING
+from compass_ros.simulation.sites import JOINTS, LYING, slides_on_what_stands
 from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize
 from compass_ros.types import Floats
 
@@ -27,6 +30,14 @@ def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
     )
 
 
+def _on_body(size: BodySize) -> tuple[Quantity, ...]:
+    v = size.fastest
+    return (
+        Quantity("extra", "1", -0.5, 1.0, 0.02),
+        Quantity("speed", "m/s", 0.01 * v, v, 0.1 * v, amplitude=False, start=0.2 * v),
+    )
+
+
 EFFECT = Effect(
     name="stribeck_friction",
     channel="dynamics",
@@ -35,7 +46,9 @@ EFFECT = Effect(
         Quantity("speed", "m/s", 0.01, 1.0, 0.05, amplitude=False, start=0.1),
     ),
     sentence="higher friction at low speed (Stribeck)",
-    on=(*LYING, *JOINTS),
+    on=(*LYING, *JOINTS, "body"),
     forces=_forces,
     on_joint=_on_joint,
+    on_body=_on_body,
+    unable=slides_on_what_stands,
 )

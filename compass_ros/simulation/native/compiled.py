@@ -21,7 +21,7 @@ from compass_ros.errors import ConfigError
 from compass_ros.places import data_home
 
 FOLDER = Path(__file__).parent
-SOURCES = ("fields.c", "pairs.h", "drives.h")
+SOURCES = ("fields.c", "pairs.h", "sliding.h", "drives.h")
 OPTIONS = ("-O2", "-ffp-contract=off")
 """Same bits on every machine: no fused operations. As in setup.py, which a test holds."""
 

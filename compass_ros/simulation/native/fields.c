@@ -46,6 +46,8 @@ typedef void (*ApplyFT)(const mjModel*, mjData*, const mjtNum*, const mjtNum*, c
 typedef void (*FwdActuation)(const mjModel*, mjData*);
 typedef void (*Rne)(const mjModel*, mjData*, int, mjtNum*);
 typedef void (*SolveM)(const mjModel*, mjData*, mjtNum*, const mjtNum*, int);
+typedef int (*IsSparse)(const mjModel*);
+typedef void (*Stage)(const mjModel*, mjData*);
 
 // Open addressing. DELETED keeps chains whole; where a chain ends in them, they turn back into empty slots. So a look-up
 // that runs meanwhile for another model always finds it. Writers hold Python's lock.
@@ -55,6 +57,8 @@ static ApplyFT apply_ft;
 static FwdActuation fwd_actuation;
 static Rne rne;
 static SolveM solve_m;
+static IsSparse is_sparse;
+static Stage island, project;
 #define DELETED ((const mjModel*)entries)
 
 static size_t home_of(const mjModel* model) { return ((uintptr_t)model >> 6) * 2654435761u % TABLE; }
@@ -69,11 +73,14 @@ static const Program* find(const mjModel* model) {
 int compass_headers(void) { return mjVERSION_HEADER; }
 
 // How many kinds of force there are: a library that was compiled from another source has other ones. 0 without them.
-int compass_init(ApplyFT apply, FwdActuation actuation, Rne bias, SolveM solve) {
+int compass_init(ApplyFT apply, FwdActuation actuation, Rne bias, SolveM solve, IsSparse sparse, Stage islands, Stage projects) {
   apply_ft = apply;
   fwd_actuation = actuation;
   rne = bias;
   solve_m = solve;
+  is_sparse = sparse;
+  island = islands;
+  project = projects;
   return TETHER;
 }
 
@@ -376,6 +383,7 @@ static void tangential_impulse(const mjModel* m, mjData* d, const Term* term) {
 }
 
 #include "pairs.h"
+#include "sliding.h"
 #include "drives.h"
 
 // --- what MuJoCo calls --------------------------------------------------------------------------------------------------
@@ -472,7 +480,7 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
 void compass_passive(const mjModel* m, mjData* d) {
   const Program* program = find(m);
   if (!program) return;
-  int holding = 0;
+  int holding = 0, changed = 0;
   for (int64_t i = 0; i < program->n; i++) {
     const Term* term = program->term + i;
     switch (term->kind) {
@@ -482,8 +490,12 @@ void compass_passive(const mjModel* m, mjData* d) {
       case ROLLING: rolling_resistance(m, d, term); break;
       case PAIR_ATTRACTION: case TETHER: between(m, d, term); break;
       case SERVO_DEAD_BAND: servo_dead_band(m, d, term); break;
-      default: if (dry(term)) holding++; else push(m, d, term);
+      default:
+        if (dry(term)) holding++;
+        else if (slides(term)) changed |= sliding_friction(m, d, term);
+        else push(m, d, term);
     }
   }
+  if (changed) island(m, d), project(m, d);   // both have copied what was changed
   if (holding) hold(m, d, program, holding);
 }

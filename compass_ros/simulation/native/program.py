@@ -18,6 +18,8 @@ from compass_ros.simulation.sites import DRIVES, JOINTS, PLANAR, Site
 from compass_ros.types import Floats
 
 NUMBERS = 8
+_CALLED = ("applyFT", "fwdActuation", "rne", "solveM", "isSparse", "island", "projectConstraint")
+"""What fields.c calls of MuJoCo, as `compass_init` takes them."""
 _TERM = np.dtype([("kind", "i4"), ("object", "i4"), ("id", "i4"), ("dof", "i4"), ("number", "f8", (NUMBERS,))])
 _PROGRAM = np.dtype([("n", "i8"), ("term", "u8")])
 
@@ -196,11 +198,10 @@ def _library() -> ctypes.PyDLL:
     library.compass_forget.restype = None
     library.compass_evaluate.argtypes = [ctypes.c_int64, *2 * [ctypes.c_void_p], ctypes.c_double, ctypes.c_void_p]
     library.compass_evaluate.restype = None
-    library.compass_init.argtypes = 4 * [ctypes.c_void_p]
+    library.compass_init.argtypes = len(_CALLED) * [ctypes.c_void_p]
     library.compass_init.restype = ctypes.c_int
     mj = mujoco_library()
-    functions = mj.mj_applyFT, mj.mj_fwdActuation, mj.mj_rne, mj.mj_solveM
-    called = [ctypes.cast(function, ctypes.c_void_p) for function in functions]
+    called = [ctypes.cast(getattr(mj, f"mj_{name}"), ctypes.c_void_p) for name in _CALLED]
     if library.compass_init(*called) != max(Kind):
         raise ConfigError(f"{path}: was compiled from another version of fields.c; run `make install`")
     callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)

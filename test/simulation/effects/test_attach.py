@@ -135,7 +135,7 @@ def test_what_acts_outside_the_model_is_refused_in_one_line(name: str) -> None:
         (exported("viscous_drag", (1.0,), ("world",)), "no joint or moving body 'world'"),
         (
             exported("friction_patch", (0.1, 0.0, 0.0, 0.1)),
-            "'friction_patch': the scene has no body on the cell's table 'puck'",
+            "'friction_patch': the scene has no body on the cell's table or moving body 'puck'",
         ),
         (Exported((), {"ball": Sliding("ball", np.ones(1), np.ones(1), np.ones(1))}), "no moving body 'ball'"),
     ],
