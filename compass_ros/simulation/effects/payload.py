@@ -3,8 +3,8 @@
 The body grows by a point `mass` at (moment_x, moment_y, moment_z) / mass from its centre of mass, in its own frame:
 weight, inertia and centre of mass follow. First moments of mass are what motion is linear in (base parameters:
 Atkeson, An and Hollerbach 1986); a place is not known where the mass is not. Its inertia is that of a lump within three
-extents of the body. On an arm it belongs on the last link. MuJoCo compiles a body whose mass is at its origin as centred
-for good; on such a one the mass is at the centre. Source: rigid-body dynamics, parallel axes.
+extents of the body. On an arm it belongs on the last link. MuJoCo compiles a body whose mass is at its origin as
+centred for good; on such a one the mass is at the centre. Source: rigid-body dynamics, parallel axes.
 """
 
 from __future__ import annotations
