@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compass_ros.discovery.evidence import Tangent, evidences, log_sum
-from compass_ros.discovery.kernels import features_of, of_sizes, shared
+from compass_ros.discovery.kernels import KERNELS, features_of, of_sizes, shared
 from compass_ros.discovery.response import Response
 from compass_ros.discovery.settings import FREE, KEPT, MEMORY_S, RHO, RHO_PRIOR
 from compass_ros.types import Floats
@@ -52,11 +52,12 @@ class Free:
 
 
 def free(response: Response) -> Free:
-    """The model of a response with a discrepancy of any size: of forces or of signals in time, or of the state."""
+    """The model of a response with a discrepancy of any size: of forces or of signals in time, or of place, velocity or
+    both."""
     alone, *found = evidences(response.tangent, [None, *(spread(response, size) for size in free_sizes(response))])
     logs = np.array([f.log for f in found])
     forces, signals = (log_sum(part) - np.log(len(FREE)) for part in (logs[: len(FREE)], logs[len(FREE) :]))
-    state = shared(response, "state").log
+    state = log_sum(np.array([shared(response, kernel).log for kernel in KERNELS])) - float(np.log(len(KERNELS)))
     best, moments = int(np.argmax(logs[: len(FREE)])), len(response.kicks.moments_s)
     pushes = found[best].pushes.reshape(-1, moments, len(response.unit))
     log = log_sum(np.array([forces, signals, state])) - float(np.log(3))
@@ -72,7 +73,8 @@ def free_sizes(response: Response) -> list[Floats]:
 def with_law(response: Response, sizes: Floats) -> tuple[float, float]:
     """Log evidence of a model with laws, and the posterior mean of rho, the discrepancy's size as a share of theirs.
 
-    In time, or over the state, equally probable: a law whose form is wrong is wrong in the same way in every episode.
+    In time, or over place, velocity or both, equally probable: a law whose form is wrong is wrong in the same way in
+    every episode, and in what the law itself depends on.
 
     Args:
         sizes: (S,) rms of the laws along the fitted motion.
@@ -80,8 +82,9 @@ def with_law(response: Response, sizes: Floats) -> tuple[float, float]:
     in_time = evidences(response.tangent, [spread(response, rho * sizes) for rho in RHO])
     logs = [np.array([f.log for f in in_time])]
     if np.any(sizes[: len(response.site_of)] > 0):
-        features = features_of(response, "state", sizes)
-        logs.append(np.append(logs[0][:1], [f.log for f in of_sizes(response, features, RHO[1:])]))
+        for kernel in KERNELS:
+            found = of_sizes(response, features_of(response, kernel, sizes), RHO[1:])
+            logs.append(np.append(logs[0][:1], [f.log for f in found]))
     each = np.array(logs) + np.log(RHO_PRIOR) - np.log(len(logs))
     total = log_sum(each.ravel())
     return total, float(np.exp(each - total).sum(axis=0) @ np.array(RHO))

@@ -151,13 +151,17 @@ def _with_law(parent: Hypothesis, values: Floats) -> tuple[Ints, Floats]:
 
 
 def _unbent(parent: Hypothesis, rows: Ints) -> tuple[Floats, Strongest, tuple[float, ...]]:
-    """(P,) of the parent's model fitted to the longest horizon that calls for nothing more, and the longer ones."""
+    """(P,) the parent's model fitted to the longest horizon that calls for nothing more, and the longer ones.
+
+    With all that is free in it, to the end: what a fit still lacks, a discrepancy seems to be called for.
+    """
     likelihood, first = parent.likelihood.of(rows), len(parent.simulator.cell.parameters)
     values = parent.likelihood.prior_mean.copy()
     values[first:] = parent.fit.point.values[first:]
     begun, shapes = strongest(likelihood, values), first + _shapes(parent.laws)
-    horizons = likelihood.horizons
+    horizons, steps = likelihood.horizons, difference_steps(parent.fit.linear)
     for k, (part, fit) in enumerate(growing(likelihood, values, shapes, begun)):
+        fit = minimise(part, fit.point, parent.fit.free, 2 * FEW, parent.fit.robust, 1.0, steps=steps, fresh=False)
         found = free(respond(parent.simulator, part, fit))
         if found.log + PRIOR_UNKNOWN > found.alone:
             return values, begun, horizons[k:]

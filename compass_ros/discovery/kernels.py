@@ -22,6 +22,7 @@ from compass_ros.types import Floats
 
 Kernel = Literal["place", "velocity", "state"]
 """`state`: of both together."""
+KERNELS: tuple[Kernel, ...] = ("place", "velocity", "state")
 FEATURES = 60
 """Of each direction; a budget. Of a local field on pucks (3 shots) the log evidence, some 3,400 over none, is 4 (place,
 velocity) to 6 (state) higher with 120, and 5 to 17 lower with 30: all alike, so what is compared moves by 2 or so."""
