@@ -160,8 +160,8 @@ def _unbent(parent: Hypothesis, rows: Ints) -> tuple[Floats, Strongest, tuple[fl
     values[first:] = parent.fit.point.values[first:]
     begun, shapes = strongest(likelihood, values), first + _shapes(parent.laws)
     horizons, steps = likelihood.horizons, difference_steps(parent.fit.linear)
-    for k, (part, fit) in enumerate(growing(likelihood, values, shapes, begun)):
-        fit = minimise(part, fit.point, parent.fit.free, 2 * FEW, parent.fit.robust, 1.0, steps=steps, fresh=False)
+    for k, (part, rough) in enumerate(growing(likelihood, values, shapes, begun)):
+        fit = minimise(part, rough.point, parent.fit.free, 2 * FEW, parent.fit.robust, 1.0, steps=steps, fresh=False)
         found = free(respond(parent.simulator, part, fit))
         if found.log + PRIOR_UNKNOWN > found.alone:
             return values, begun, horizons[k:]

@@ -17,7 +17,7 @@ from compass_ros.cells.rotors import rotors
 from compass_ros.simulation.effects import Exported, FittedEffect
 from compass_ros.simulation.effects.attach import context_in
 from compass_ros.simulation.effects.effect import RESTORED, table_friction
-from compass_ros.simulation.native.program import Kind, Term
+from compass_ros.simulation.native.program import SLIDING, Kind, Term
 from compass_ros.simulation.sites import JOINTS, PLANAR, Places
 from compass_ros.targets.said import Said
 from compass_ros.types import Floats
@@ -26,11 +26,12 @@ SOURCE = Path(__file__).with_name("mjx_laws.py")
 _NO_TERMS = "TERMS: tuple[Term, ...] = ()"
 _UNCHANGED = "CHANGED: dict[str, Any] = {}"
 _DRY = (Kind.COULOMB, Kind.STRIBECK, Kind.ASYMMETRIC, Kind.LOAD_FRICTION)
+_NO_PLACE = "MJX offers no place between its contacts and their solver"
 _UNSAID: Mapping[Kind, str] = {
-    Kind.RATE_RESTITUTION: "MJX offers no place between its contacts and their solver",
-    Kind.TANGENTIAL: "MJX offers no place between its contacts and their solver",
-    Kind.ROLLING: "MJX offers no place between its contacts and their solver",
-    Kind.ADHESION: "MJX offers no place between its contacts and their solver",
+    Kind.RATE_RESTITUTION: _NO_PLACE,
+    Kind.TANGENTIAL: _NO_PLACE,
+    Kind.ROLLING: _NO_PLACE,
+    Kind.ADHESION: _NO_PLACE,
     Kind.SERVO_DEAD_BAND: "it replaces a servo's own force, which MJX computes after the applied ones",
 }
 
@@ -71,11 +72,17 @@ def _of(fitted: FittedEffect, places: Places, exported: Exported, changed: mujoc
         law.model(changed, np.array(fitted.values), context)
         return [], Said(law.name, on, "exact", "by `prepare`")
     terms = list(law.forces(np.array([fitted.values]), context)) if law.forces is not None else []
-    if unsaid := [_UNSAID[term.kind] for term in terms if term.kind in _UNSAID]:
+    if unsaid := [why for term in terms if (why := _unsaid(term))]:
         return [], Said(law.name, on, "left out", unsaid[0])
     if any(term.kind in _DRY and term.site is not None and term.site.kind in JOINTS for term in terms):
         return terms, Said(law.name, on, "alike", "whole from the speed that it stops in a step; what it holds creeps")
     return terms, Said(law.name, on, "exact")
+
+
+def _unsaid(term: Term) -> str:
+    """Why MJX cannot have a term; empty: it can."""
+    of_contacts = term.kind in SLIDING and term.site is not None and term.site.kind == "body"
+    return _NO_PLACE if of_contacts else _UNSAID.get(term.kind, "")
 
 
 def placed(term: Term) -> tuple[str, str, tuple[str, ...]]:

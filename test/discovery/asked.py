@@ -82,6 +82,28 @@ def rolling(count: int, seed: int = 3) -> Floats:
     return flat
 
 
+def sled(folder: Path) -> Cell:
+    """A box that slides on a floor until it stands; its friction is tuned."""
+    scene = """<mujoco><option timestep="0.002" cone="elliptic"/><worldbody>
+      <geom name="floor" type="plane" size="9 9 1"/>
+      <body name="sled" pos="0 0 0.02"><freejoint name="sled"/>
+      <geom name="sled" type="box" size=".05 .04 .02" mass=".5" friction="0.3"/></body></worldbody>
+      <contact><pair name="rub" geom1="floor" geom2="sled" condim="3" friction="0.3 0.3 0.005 0.0001 0.0001"/></contact>
+      </mujoco>"""
+    tuned = [parameter("rub@contact@friction", "pair_friction", "rub", 0.3, 0.05)]
+    objects = [{"name": "sled", "quantity": "xyz"}]
+    return written(folder, scene, content(objects, tuned, start=[{"object": "sled"}], noise_m=5e-4))
+
+
+def pushes(count: int, seed: int = 5) -> Floats:
+    """(count, 6) positions and speeds on the floor."""
+    rng = np.random.default_rng(seed)
+    flat, towards = np.zeros((count, 6)), rng.uniform(0, 2 * np.pi, count)
+    speed = rng.uniform(0.4, 1.2, count)
+    flat[:, 2], flat[:, 3], flat[:, 4] = 0.0199, speed * np.cos(towards), speed * np.sin(towards)
+    return flat
+
+
 def foot(folder: Path) -> Cell:
     """A foot on a pad that a servo lifts, slower or faster; its friction and mass are tuned."""
     scene = """<mujoco><option timestep="0.001"/><worldbody>

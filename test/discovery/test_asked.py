@@ -84,6 +84,19 @@ def test_rolling_resistance_is_seen_where_a_ball_rolls(tmp_path: Path) -> None:
     near_the_top(found, "rolling_resistance", pair)
 
 
+@pytest.mark.parametrize(
+    ("law", "sizes"),
+    [
+        ("stribeck_friction", {"extra": 5.0, "speed": 0.2}),
+        ("anisotropic_friction", {"along_x": 2.0, "diagonal": -1.0}),
+        ("friction_gradient", {"along_x": 2.0}),
+        ("friction_patch", {"extra": 5.0, "centre_x": 0.1, "radius": 0.1}),
+    ],
+)
+def test_friction_is_seen_where_a_body_slides(tmp_path: Path, law: str, sizes: dict[str, float]) -> None:
+    near_the_top(ranked(asked.sled(tmp_path), asked.pushes(8), law, ("sled",), sizes), law, ("sled",))
+
+
 def test_adhesion_is_seen_where_a_foot_sticks(tmp_path: Path) -> None:
     pair = ("pad", "foot")
     near_the_top(ranked(asked.foot(tmp_path), asked.lifts(6), "adhesion", pair, {"force": 10.0}), "adhesion", pair)

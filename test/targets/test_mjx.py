@@ -106,6 +106,14 @@ def test_what_mjx_has_no_place_for_is_left_out_and_said(scene: Callable[[str], P
     assert "TERMS: tuple[Term, ...] = ()" in (tmp_path / "laws_mjx.py").read_text(encoding="utf-8")
 
 
+def test_friction_of_a_body_in_space_is_left_out(scene: Callable[[str], Path], tmp_path: Path) -> None:
+    floor = '<geom type="plane" size="9 9 1"/><body name="one" pos="0 0 .1"><freejoint/><geom size=".1"/></body>'
+    slides = Attached(effect("stribeck_friction").on_kinds(("body",)), ("one",))
+    laws = Exported((FittedEffect(slides, (0.1, 0.3), (0.0, 0.0)),), {})
+    (said,) = write_mjx(scene(f"<mujoco><worldbody>{floor}</worldbody></mujoco>"), laws, tmp_path / "laws_mjx.py")
+    assert (said.fate, "contacts" in said.line()) == ("left out", True)
+
+
 def test_every_kind_of_force_is_written_or_said(scene: Callable[[str], Path], tmp_path: Path) -> None:
     """A kind that is new in fields.c has to be decided on here too."""
     source = SOURCE.read_text(encoding="utf-8")

@@ -61,6 +61,10 @@ class Kind(IntEnum):
     TETHER = 32
 
 
+SLIDING = (Kind.STRIBECK, Kind.FRICTION_PATCH, Kind.FRICTION_GRADIENT, Kind.ANISOTROPIC)
+"""Of a body in space these change the friction of its contacts (sliding.h); they are no force at its centre."""
+
+
 class Placement(IntEnum):
     """Where a force goes: joints that slide along x and y (and turn about z), any moving body, a joint, an actuator, or
     both of two geoms or bodies."""
