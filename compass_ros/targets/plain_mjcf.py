@@ -133,10 +133,9 @@ def _payload(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
     given, model = numbers(fitted), spec.compile()
     for name in fitted.attached.objects:
         body, compiled = spec.body(name), model.body(name)
-        moment = np.array([given.get(f"moment_{axis}", 0.0) for axis in "xyz"])
-        away = payload.place(model, compiled.id, given["mass"], moment)
+        mass, away = payload.lump(model, compiled.id, np.array(list(given.values())))
         load = body.add_body(name=f"{name}_payload", pos=np.array(compiled.ipos) + away)
-        load.mass, load.ipos, load.inertia = given["mass"], np.zeros(3), np.full(3, _POINT)
+        load.mass, load.ipos, load.inertia = mass, np.zeros(3), np.full(3, _POINT)
         load.explicitinertial = True
     return Said("payload", fitted.attached.objects, "exact")
 

@@ -2,9 +2,10 @@
 
 The body grows by a point `mass` at (moment_x, moment_y, moment_z) / mass from its centre of mass, in its own frame:
 weight, inertia and centre of mass follow. First moments of mass are what motion is linear in (base parameters:
-Atkeson, An and Hollerbach 1986); a place is not known where the mass is not. Its inertia is that of a lump within three
-extents of the body. On an arm it belongs on the last link. MuJoCo compiles a body whose mass is at its origin as
-centred for good; on such a one the mass is at the centre. Source: rigid-body dynamics, parallel axes.
+Atkeson, An and Hollerbach 1986); a place is not known where the mass is not. It is within three extents of the body: a
+moment that asks for more brings the mass that it needs there. On an arm it belongs on the last link. MuJoCo compiles a
+body whose mass is at its origin as centred for good; on such a one the mass is at the centre.
+Source: rigid-body dynamics, parallel axes.
 """
 
 from __future__ import annotations
@@ -23,22 +24,27 @@ _REACH = 3.0
 
 
 def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
-    moment = np.zeros(3)
-    moment[: len(numbers) - 1] = numbers[1:]
     for site in context.sites if numbers.any() else ():
         body = model.body(site.name).id
-        if moment.any():
-            _off_centre(model, body, float(numbers[0]), moment)
-        model.body_mass[body] += numbers[0]
+        added, offset = lump(model, body, numbers)
+        if offset.any():
+            _off_centre(model, body, added, offset)
+        model.body_mass[body] += added
 
 
-def place(model: mujoco.MjModel, body: int, mass: float, moment: Floats) -> Floats:
-    """(3,) where a load is, from the body's centre of mass [m]; at most as far as one may be."""
+def lump(model: mujoco.MjModel, body: int, numbers: Floats) -> tuple[float, Floats]:
+    """Mass [kg] and (3,) place from the body's centre of mass [m] of a load with these numbers.
+
+    One that would be farther away than a load may be has the mass that it needs at that distance.
+    """
+    moment = np.zeros(3)
+    moment[: len(numbers) - 1] = numbers[1:]
     extent = float(np.sqrt(model.body_inertia[body].sum() / (2 * model.body_mass[body])))
-    return np.asarray(moment / max(mass, float(np.linalg.norm(moment)) / (_REACH * extent), 1e-300))
+    mass = max(float(numbers[0]), float(np.linalg.norm(moment)) / (_REACH * extent))
+    return mass, moment / max(mass, 1e-300)
 
 
-def _off_centre(model: mujoco.MjModel, body: int, added: float, moment: Floats) -> None:
+def _off_centre(model: mujoco.MjModel, body: int, added: float, offset: Floats) -> None:
     """Centre and moments of inertia, with the axes of the largest first as MuJoCo has them."""
     if model.body_simple[body]:
         raise ConfigError(
@@ -48,14 +54,14 @@ def _off_centre(model: mujoco.MjModel, body: int, added: float, moment: Floats) 
     turn = np.zeros(9)
     mujoco.mju_quat2Mat(turn, model.body_iquat[body])
     axes = turn.reshape(3, 3)
-    own, offset = float(model.body_mass[body]), place(model, body, added, moment)
+    own = float(model.body_mass[body])
     reduced = own * added / (own + added)
     tensor = axes @ np.diag(model.body_inertia[body]) @ axes.T
     tensor += reduced * (offset @ offset * np.eye(3) - np.outer(offset, offset))
     moments, columns = np.linalg.eigh(tensor)
     columns = columns[:, ::-1]
     columns[:, 2] = np.cross(columns[:, 0], columns[:, 1])
-    model.body_ipos[body] += moment / (own + added)
+    model.body_ipos[body] += offset * added / (own + added)
     model.body_inertia[body] = moments[::-1]
     mujoco.mju_mat2Quat(model.body_iquat[body], np.ascontiguousarray(columns).ravel())
     model.body_sameframe[body] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
