@@ -79,12 +79,8 @@ def save(belief: Belief, path: Path) -> None:
 
 
 def _laws(case: Case) -> list[dict[str, object]]:
-    at, said = len(case.simulator.cell.parameters), []
-    for attached in case.simulator.effects:
-        own = slice(at, at := at + len(attached.effect.quantities))
-        values = tuple(float(v) for v in case.values[0, own])
-        said.append(as_entry(FittedEffect(attached, values, (nan,) * len(values))))
-    return said
+    of_first = case.simulator.physics.of_effects(case.values[:1])
+    return [as_entry(FittedEffect(law, tuple(own[0].tolist()), (nan,) * own.shape[1])) for law, own in of_first]
 
 
 def load(path: Path, simulator: Simulator) -> Belief:

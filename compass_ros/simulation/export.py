@@ -109,9 +109,6 @@ def write_effects_of(
     fitted = []
     if simulator is not None and values is not None:
         errors = np.full(len(values), np.nan) if std is None else std
-        at = len(cell.parameters)
-        for attached in simulator.effects:
-            own = slice(at, at + len(attached.effect.quantities))
-            fitted.append(FittedEffect(attached, tuple(values[own].tolist()), tuple(errors[own].tolist())))
-            at = own.stop
+        for law, own in simulator.physics.of_effects(np.stack([values, errors])):
+            fitted.append(FittedEffect(law, tuple(own[0].tolist()), tuple(own[1].tolist())))
     write_effects(fitted, sliding, path)

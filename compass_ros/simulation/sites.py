@@ -17,7 +17,7 @@ import numpy as np
 from compass_ros.cells.auto_rules import candidates
 from compass_ros.cells.candidate import Candidate
 from compass_ros.errors import nearest
-from compass_ros.types import SiteWord
+from compass_ros.types import Bools, Ints, SiteWord
 
 SiteKind = Literal[
     "hinge",
@@ -77,6 +77,8 @@ _WORDS: dict[SiteKind, str] = {
     "sensor": "other sensor",
     "field": "number",
 }
+_WITH_FRICTION = 3
+"""Dimensions of a contact that has friction: MuJoCo's condim."""
 _SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
 ONE_DOF = (_HINGE, _SLIDE)
 OF_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
@@ -270,11 +272,8 @@ class Places:
         one, other = np.triu_indices(model.ngeom, 1)
         weld = model.body_weldid[model.geom_bodyid]
         parent = model.body_weldid[model.body_parentid[weld]]
-        masks = (model.geom_contype[one] & model.geom_conaffinity[other]) | (
-            model.geom_contype[other] & model.geom_conaffinity[one]
-        )
         family = ((parent[one] == weld[other]) & (weld[other] > 0)) | ((parent[other] == weld[one]) & (weld[one] > 0))
-        return bool(np.any((masks != 0) & (weld[one] != weld[other]) & ~family))
+        return bool(np.any(_meet(model, one, other) & (weld[one] != weld[other]) & ~family))
 
 
 def slides_on_what_stands(model: mujoco.MjModel, site: Site) -> str:
@@ -283,17 +282,19 @@ def slides_on_what_stands(model: mujoco.MjModel, site: Site) -> str:
         return ""
     own = model.geom_bodyid == model.body(site.name).id
     stands = model.body_weldid[model.geom_bodyid] == 0
-    for one, other, dim in zip(model.pair_geom1, model.pair_geom2, model.pair_dim, strict=True):
-        if dim >= _WITH_FRICTION and ((own[one] and stands[other]) or (own[other] and stands[one])):
-            return ""
+    one, other = model.pair_geom1, model.pair_geom2
+    paired = (own[one] & stands[other]) | (own[other] & stands[one])
+    one, other = np.flatnonzero(own)[:, None], np.flatnonzero(stands)
+    rubs = np.maximum(model.geom_condim[one], model.geom_condim[other]) >= _WITH_FRICTION
+    if np.any(paired & (model.pair_dim >= _WITH_FRICTION)) or np.any(_meet(model, one, other) & rubs):
+        return ""
+    return "it touches nothing that stands with friction"
+
+
+def _meet(model: mujoco.MjModel, one: Ints, other: Ints) -> Bools:
+    """Whether the contact masks of geoms let them touch."""
     types, answers = model.geom_contype, model.geom_conaffinity
-    meets = (types[own][:, None] & answers[stands]) | (answers[own][:, None] & types[stands])
-    rubs = np.maximum(model.geom_condim[own][:, None], model.geom_condim[stands]) >= _WITH_FRICTION
-    return "" if np.any((meets != 0) & rubs) else "it touches nothing that stands with friction"
-
-
-_WITH_FRICTION = 3
-"""Dimensions of a contact that has friction: MuJoCo's condim."""
+    return np.asarray(((types[one] & answers[other]) | (types[other] & answers[one])) != 0)
 
 
 def slides_in_plane(model: mujoco.MjModel, body: int) -> bool:

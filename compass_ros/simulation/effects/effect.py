@@ -229,7 +229,8 @@ def friction(
 
     Of a body on a table both are the cell's. A body that the cell says nothing of lies with all its weight, and its
     friction is faded in at 1 mm/s. Of a joint the first number is a force; fields.c holds a joint with it against all
-    other forces, the frictions of all joints together. `softness`: (B, 1) of a joint [s], or no column: it is hard.
+    other forces, the frictions of all joints together. Of a body in space sliding.h takes neither: its contacts are
+    MuJoCo's. `softness`: (B, 1) of a joint [s], or no column: it is hard.
     """
     hard = np.zeros((len(before), 1))
     terms = []

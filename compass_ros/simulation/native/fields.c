@@ -73,7 +73,8 @@ static const Program* find(const mjModel* model) {
 int compass_headers(void) { return mjVERSION_HEADER; }
 
 // How many kinds of force there are: a library that was compiled from another source has other ones. 0 without them.
-int compass_init(ApplyFT apply, FwdActuation actuation, Rne bias, SolveM solve, IsSparse sparse, Stage islands, Stage projects) {
+int compass_init(ApplyFT apply, FwdActuation actuation, Rne bias, SolveM solve, IsSparse sparse, Stage islands,
+                 Stage projects) {
   apply_ft = apply;
   fwd_actuation = actuation;
   rne = bias;
@@ -150,6 +151,19 @@ static Force tilted(const double g[3], double one, double two) {
   return (Force){f[0], f[1], f[2]};
 }
 
+// By how much a coefficient of friction is larger at a place and a speed.
+static double more_friction(const Term* term, double x, double y, double speed) {
+  const double* p = term->number;
+  switch (term->kind) {
+    case STRIBECK: return p[0] * exp(-speed * speed / (p[3] * p[3]));
+    case FRICTION_PATCH: {
+      double rx = x - p[1], ry = y - p[2];
+      return p[0] / (1 + exp(10 * (sqrt(rx * rx + ry * ry) / p[3] - 1)));
+    }
+    default: return p[0] * x + p[1] * y;   // FRICTION_GRADIENT
+  }
+}
+
 static Force evaluate(const Term* term, const State* s) {
   const double* p = term->number;
   const double rx = s->x - p[1], ry = s->y - p[2];   // used by the fields around a point
@@ -160,17 +174,14 @@ static Force evaluate(const Term* term, const State* s) {
     case COULOMB:          // p: friction (JOINT: force), creep speed (JOINT: time constant, for `hold`), share of the weight
       return term->object == JOINT ? along(s, p[0], 0) : along(s, p[0] * s->weight * p[2], p[1]);
     case STRIBECK:         // p: extra friction at rest, creep speed, share of the weight, Stribeck speed
-      return along(s, p[0] * (term->object == JOINT ? 1.0 : s->weight * p[2]) * exp(-s->speed * s->speed / (p[3] * p[3])),
-                   p[1]);
+      return along(s, more_friction(term, s->x, s->y, s->speed) * (term->object == JOINT ? 1.0 : s->weight * p[2]), p[1]);
     case PULSATING:        // p: cosine and sine amplitude, creep speed, share of the weight, frequency
       return along(s, (p[0] * cos(2 * M_PI * p[4] * s->time) + p[1] * sin(2 * M_PI * p[4] * s->time)) * s->weight * p[3],
                    p[2]);
-    case FRICTION_PATCH: { // p: extra friction, centre x, y, radius, creep speed, share of the weight
-      double inside = 1.0 / (1.0 + exp(10.0 * (r / p[3] - 1.0)));
-      return along(s, p[0] * inside * s->weight * p[5], p[4]);
-    }
+    case FRICTION_PATCH:   // p: extra friction, centre x, y, radius, creep speed, share of the weight
+      return along(s, more_friction(term, s->x, s->y, s->speed) * s->weight * p[5], p[4]);
     case FRICTION_GRADIENT:  // p: gradient along x, along y, creep speed, share of the weight
-      return along(s, (p[0] * s->x + p[1] * s->y) * s->weight * p[3], p[2]);
+      return along(s, more_friction(term, s->x, s->y, s->speed) * s->weight * p[3], p[2]);
     case ANISOTROPIC: {    // p: extra friction along x (less along y), along the diagonal, creep speed, share of the weight
       double k = -s->weight * p[3] / sqrt(s->speed * s->speed + p[2] * p[2]);
       return (Force){k * (p[0] * s->vx + p[1] * s->vy), k * (p[1] * s->vx - p[0] * s->vy), 0};

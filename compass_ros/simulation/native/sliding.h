@@ -9,13 +9,8 @@ typedef struct {
 
 static Coefficient coefficient(const Term* term, const double at[3], const double v[3]) {
   const double* p = term->number;
-  double speed = norm3(v), rx = at[0] - p[1], ry = at[1] - p[2];
-  switch (term->kind) {
-    case STRIBECK: return (Coefficient){.all = p[0] * exp(-speed * speed / (p[3] * p[3]))};
-    case FRICTION_PATCH: return (Coefficient){.all = p[0] / (1 + exp(10 * (sqrt(rx * rx + ry * ry) / p[3] - 1)))};
-    case FRICTION_GRADIENT: return (Coefficient){.all = p[0] * at[0] + p[1] * at[1]};
-    default: return (Coefficient){.one = p[0], .two = p[1]};   // ANISOTROPIC
-  }
+  if (term->kind == ANISOTROPIC) return (Coefficient){.one = p[0], .two = p[1]};
+  return (Coefficient){.all = more_friction(term, at[0], at[1], norm3(v))};
 }
 
 static int slides(const Term* term) {

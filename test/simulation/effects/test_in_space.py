@@ -139,6 +139,16 @@ def test_a_payload_is_what_mujoco_makes_of_a_lump_welded_there(place: tuple[floa
     np.testing.assert_allclose(data.qpos, other.qpos, atol=1e-6)
 
 
+def test_a_moment_alone_is_a_load_at_the_farthest_place() -> None:
+    """Three extents away, an extent the root mean square distance of the body's mass from its centre."""
+    lacking, whole = (mujoco.MjModel.from_xml_string(ARM.format(more="")) for _ in range(2))
+    farthest = 3 * float(np.sqrt(lacking.body("hand").inertia.sum() / (2 * lacking.body("hand").mass[0])))
+    start = 0.5, np.array([0.5, 0.3]), np.array([1.0, -2.0])
+    data = after(lacking, law("payload", (0.0, 0.0, 0.006, 0.0), "hand"), *start)
+    other = after(whole, law("payload", (0.006 / farthest, 0.0, 0.006, 0.0), "hand"), *start)
+    np.testing.assert_allclose(data.qpos, other.qpos, atol=1e-12)
+
+
 def test_a_payload_beside_the_centre_of_a_body_compiled_as_centred_is_refused() -> None:
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><worldbody><body name="it"><freejoint/><geom size=".1"/></body></worldbody></mujoco>'
