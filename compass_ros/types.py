@@ -454,6 +454,8 @@ class Explanation:
     log_evidence: float
     held_out: HeldOut | None = None
     """None for a discrepancy of no known form, which predicts nothing, and where no episode was held out."""
+    corrections: tuple[ExplainedLaw, ...] = ()
+    """What stands in the simulator for the rest of the form of `laws`: no physics of its own."""
 
 
 @dataclass(frozen=True)

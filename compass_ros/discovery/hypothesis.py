@@ -41,10 +41,17 @@ class Hypothesis:
     fit: Fit
     without: Floats | None = None
     """(E, F, C) what the simulator without laws leaves at its own fit [sigma]; None: this is it."""
+    corrections: tuple[Attached, ...] = ()
+    """Those of its laws that stand for what the form of the others lacks (`form.py`)."""
 
     @property
     def name(self) -> str:
         return name_of(self.laws)
+
+    @property
+    def physics(self) -> tuple[Attached, ...]:
+        """Its laws without the corrections."""
+        return tuple(a for a in self.laws if a not in self.corrections)
 
     @property
     def chi_square(self) -> float:
@@ -61,7 +68,11 @@ class Hypothesis:
 
     @cached_property
     def sizes(self) -> Floats:
-        """(S,) rms of its laws along the fitted motion: accelerations, and errors of signals.
+        """(S,) rms of all its laws along the fitted motion."""
+        return self.sizes_of(self.laws)
+
+    def sizes_of(self, laws: Sequence[Attached]) -> Floats:
+        """(S,) rms of some of its laws along the fitted motion: accelerations, and errors of signals.
 
         A force has its size along each line on which it could push a body: its direction may be as wrong as its size.
         What acts on contacts, commands or signals counts as what moves the recordings as much as the laws do when all
@@ -71,8 +82,8 @@ class Hypothesis:
         moved = self.bare - self.fit.linear.residual
         channels = set()
         for attached, own in self.own():
-            if attached.effect.scattered:
-                continue  # each episode has its own number of it: no form that could be wrong
+            if attached not in laws or attached.effect.scattered:
+                continue  # of a scatter each episode has its own number: no form that could be wrong
             if attached.effect.forces is not None and attached.effect.channel == "dynamics":
                 squared += np.mean(self._pushed(attached, own) ** 2, axis=(0, 1))
             else:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import log
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.fits import finished, without
+from compass_ros.discovery.form import told_apart
 from compass_ros.discovery.hypothesis import Hypothesis, name_of
 from compass_ros.discovery.neighbours import exchange, rank, widen
 from compass_ros.discovery.odds import Known, Prior
@@ -28,7 +30,8 @@ DEEPEST = 3
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Models by their log posterior odds against the plain one, the best first; without it and `unknown`."""
+    """Models by their log posterior odds against the plain one, the best first, one for each set of laws that is named;
+    without the plain one and `unknown`."""
 
     plain: Hypothesis
     unknown: float
@@ -82,7 +85,8 @@ def search(
             break  # no law more could come up to a free discrepancy
         if len(names) + 1 == DEEPEST:  # what stays below it there stays below it
             ranked, least = could, found.unknown
-    models = known.ordered
+    total = log_sum(np.array([*others, *(odds for _, odds in known.models.values())]))
+    models = told_apart(known.models, total + log(SLIGHT))
     return Found(plain, found.unknown, tuple(h for h, _ in models), tuple(o for _, o in models), tuple(first))
 
 
@@ -122,7 +126,7 @@ def _unfinished(known: Known, others: Sequence[float]) -> str | None:
     rest, found = -np.inf, None
     for name, (_, odds) in sorted(known.models.items(), key=lambda item: item[1][1]):
         rest = np.logaddexp(rest, odds)  # of this one and all less probable ones
-        if name not in known.finished and rest - total > np.log(SLIGHT):
+        if name not in known.finished and rest - total > log(SLIGHT):
             found = name
     return found
 

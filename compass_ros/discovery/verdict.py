@@ -11,15 +11,16 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.discovery.finding import Discovery, Tried, Weighed, held_out_error
 from compass_ros.discovery.floor import TWICE, shown_noise
-from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.hypothesis import Hypothesis, name_of
 from compass_ros.discovery.maps import table_map
 from compass_ros.discovery.next_shot import next_experiment
 from compass_ros.discovery.numerics import with_numerics
 from compass_ros.discovery.search import Found
 from compass_ros.discovery.settings import SLIGHT
 from compass_ros.discovery.where import whereabouts
-from compass_ros.discovery.words import DEPENDS, errors, missing, place, value_of, where_of
+from compass_ros.discovery.words import DEPENDS, corrected, errors, missing, place, value_of, where_of
 from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import Attached
 from compass_ros.simulation.replay import rms_distance
 from compass_ros.simulation.sites import PLANAR, Site, word_of
 from compass_ros.types import (
@@ -87,7 +88,7 @@ class Judge:
         A law that all of them share is sure, whatever else may be: where models with exactly the laws that are sure
         (posterior inclusion probability, Barbieri and Berger 2004) were fitted, the set is one of these.
         """
-        names = [frozenset(a.effect.name for a in m.laws) for m in self.found.models]
+        names = [frozenset(a.effect.name for a in m.physics) for m in self.found.models]
         sure = frozenset(
             name
             for name in frozenset[str]().union(*names)
@@ -123,7 +124,8 @@ class Judge:
             best, plain = self.found.models[0], self.found.plain
             was, now = plain.chi_square**0.5, best.chi_square**0.5
             left = f"leaves {now:.1f} of {was:.1f} times the noise in fitted episodes"
-            sentence += f" (probability {unknown:.2f}; the best law, {best.name}, has {of_models[0]:.2g} and {left})"
+            name = name_of(best.physics)
+            sentence += f" (probability {unknown:.2f}; the best law, {name}, has {of_models[0]:.2g} and {left})"
         before = f"held-out error {1e3 * self._before:.2f} {unit}, floor {1e3 * self._floor:.2f} {unit}"
         return self._said("unknown", f"{sentence}; {before}.", self._of_discrepancy(where))
 
@@ -138,26 +140,28 @@ class Judge:
         best, values = models[0], models[0].fit.point.values
         after = self._after(best)
         evidence = self._evidence(best, after)
-        others = dict.fromkeys(a.effect.name for m in models[1:] for a in m.laws)
+        others = dict.fromkeys(a.effect.name for m in models[1:] for a in m.physics)
         findings = tuple(
             EffectFinding(law.name, law.quantities, evidence, tuple(n for n in others if n != law.name))
-            for law in _explained(best)
+            for law in _explained(best, best.physics)
         )
-        first = next(own for _, own in best.own())
-        where = where_of(best.laws, values[first], self.simulator.movers())
+        numbers = [values[own] for attached, own in best.own() if attached in best.physics]
+        where = where_of(best.physics, numbers[0], self.simulator.movers())
         following = ""
-        lacks = missing(best.laws, [values[own] for _, own in best.own()], self.simulator.places)
+        lacks = missing(best.physics, numbers, self.simulator.places)
         if verdict == "ambiguous":
             following = next_experiment(self.simulator, best.likelihood, models, self.seed).sentence
-            lacks = "the simulator lacks one of these: " + "; ".join(dict.fromkeys(m.name for m in models))
-        names = [a.effect.name for a in best.laws]
+            lacks = "the simulator lacks one of these: " + "; ".join(dict.fromkeys(name_of(m.physics) for m in models))
+        names = [a.effect.name for a in best.physics]
         sizes = "; ".join(
-            value_of(f, a, names.count(a.effect.name) > 1) for f, a in zip(findings, best.laws, strict=True)
+            value_of(f, a, names.count(a.effect.name) > 1) for f, a in zip(findings, best.physics, strict=True)
         )
+        sizes += corrected(best.corrections)
         said = errors(self._before, after, self._floor, self.simulator.unit)
         sentence = f"{place(where, self._flat)}, {lacks}; {sizes}; {said}."
-        sites = self.simulator.places.sites(best.laws[0].objects, best.laws[0].effect.on)
-        return self._said(verdict, sentence, _on(where, sites, best.laws[0].objects), findings, following, best)
+        law = best.physics[0]
+        sites = self.simulator.places.sites(law.objects, law.effect.on)
+        return self._said(verdict, sentence, _on(where, sites, law.objects), findings, following, best)
 
     def _said(
         self,
@@ -194,7 +198,13 @@ class Judge:
             Explanation((), none, plain.log_evidence, self._held_out(self._before)),
             Explanation((ExplainedLaw(UNKNOWN, (), {}),), unknown, plain.free.log),
             *(
-                Explanation(_explained(m), float(p), m.log_evidence, self._held_out(self._after(m)))
+                Explanation(
+                    _explained(m, m.physics),
+                    float(p),
+                    m.log_evidence,
+                    self._held_out(self._after(m)),
+                    _explained(m, m.corrections),
+                )
                 for m, p in list(zip(self.found.models, of_models, strict=True))[:SAID]
             ),
         ]
@@ -250,10 +260,12 @@ def _on(where: Where, sites: Sequence[Site], names: Sequence[str]) -> Where:
     return replace(where, phase=phase, site_kind=kind, site="+".join(names) or "all")
 
 
-def _explained(model: Hypothesis) -> tuple[ExplainedLaw, ...]:
-    """The laws of a model with their numbers."""
+def _explained(model: Hypothesis, laws: Sequence[Attached]) -> tuple[ExplainedLaw, ...]:
+    """Some laws of a model with their numbers."""
     values, out = model.fit.point.values, []
     for attached, own in model.own():
+        if attached not in laws:
+            continue
         numbers = zip(attached.effect.quantities, values[own], model.std[own], strict=True)
         quantities = {q.name: EffectParameter(float(v), float(e), q.unit) for q, v, e in numbers}
         out.append(ExplainedLaw(attached.effect.name, attached.objects, quantities))

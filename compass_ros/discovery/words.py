@@ -116,6 +116,18 @@ def value_of(finding: EffectFinding, attached: Attached, told: bool) -> str:
     return f"{finding.name}{on}, {', '.join(numbers)}{together}"
 
 
+def corrected(laws: Sequence[Attached]) -> str:
+    """What stands for the rest of a law's form: '; a spring corrects the form'."""
+    said = " and ".join(
+        dict.fromkeys(a.effect.sentence if a.effect.on != ("field",) else "a number of the scene" for a in laws)
+    )
+    return (
+        f"; {said} {'corrects' if len({a.effect.name for a in laws}) == 1 else 'correct'} the form of that"
+        if laws
+        else ""
+    )
+
+
 def errors(before: float, after: float, floor: float, unit: Unit) -> str:
     """Held-out errors in thousandths of the unit."""
     return f"held-out error {1e3 * before:.2f} -> {1e3 * after:.2f} m{unit}, floor {1e3 * floor:.2f} m{unit}"

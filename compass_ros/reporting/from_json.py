@@ -119,9 +119,14 @@ def _mismatch(said: Json) -> Mismatch:
 
 
 def _explanation(said: Json) -> Explanation:
-    laws = tuple(ExplainedLaw(law["name"], tuple(law["sites"]), _quantities(law["quantities"])) for law in said["laws"])
+    laws, corrections = (
+        tuple(
+            ExplainedLaw(law["name"], tuple(law["sites"]), _quantities(law["quantities"])) for law in said.get(kind, ())
+        )
+        for kind in ("laws", "corrections")
+    )
     held_out = _held_out(said["held_out"]) if said.get("held_out") is not None else None
-    return Explanation(laws, said["probability"], _number(said["log_evidence"]), held_out)
+    return Explanation(laws, said["probability"], _number(said["log_evidence"]), held_out, corrections)
 
 
 def _held_out(said: Json) -> HeldOut:

@@ -18,6 +18,7 @@ from compass_ros.reporting.atomic import write_text
 from compass_ros.types import (
     EffectFinding,
     EffectParameter,
+    ExplainedLaw,
     Explanation,
     Gap,
     Graph,
@@ -128,14 +129,16 @@ def _quantities(quantities: Mapping[str, EffectParameter]) -> dict[str, Any]:
 
 def _explanation(explanation: Explanation) -> dict[str, Any]:
     return {
-        "laws": [
-            {"name": law.name, "sites": list(law.sites), "quantities": _quantities(law.quantities)}
-            for law in explanation.laws
-        ],
+        "laws": [_law(law) for law in explanation.laws],
         "probability": float(explanation.probability),
         "log_evidence": _number(explanation.log_evidence),
         "held_out": None if explanation.held_out is None else _held_out(explanation.held_out),
+        **({"corrections": [_law(law) for law in explanation.corrections]} if explanation.corrections else {}),
     }
+
+
+def _law(law: ExplainedLaw) -> dict[str, Any]:
+    return {"name": law.name, "sites": list(law.sites), "quantities": _quantities(law.quantities)}
 
 
 def _held_out(errors: HeldOut) -> dict[str, Any]:

@@ -1,0 +1,85 @@
+"""A lesser law is physics of its own, or stands for what the form of a larger one lacks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compass_ros.calibration.cost import Point
+from compass_ros.calibration.differences import linearise
+from compass_ros.calibration.least_squares import Fit
+from compass_ros.discovery import form
+from compass_ros.discovery.fits import without
+from compass_ros.discovery.form import told_apart
+from compass_ros.discovery.hypothesis import Hypothesis, name_of, widened
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import Attached, effect
+from compass_ros.simulation.sizes import unit_joint
+from test.simulation import robots
+
+SPRING = 0.4
+
+
+def on(joint: str, name: str) -> Attached:
+    return Attached(effect(name).at(unit_joint("hinge")), (joint,))
+
+
+def fitted(folder: Path, laws: list[Attached], numbers: list[float]) -> Hypothesis:
+    """The model of two swinging joints that has the laws, at their true numbers."""
+    cell = robots.robot(folder, ("hinge", "hinge"))
+    plain, inputs = Simulator(cell, threads=1), robots.shots(cell, 4)
+    likelihood = robots.recorded(plain, laws, numbers, inputs)
+    simulator, likelihood = widened(plain, likelihood, laws)
+    point, free = Point(np.array([*plain.defaults, *numbers]), np.zeros_like(inputs), 0.0), []
+    at = len(plain.defaults)
+    for law in laws:
+        free += [at + i for i in np.flatnonzero(law.amplitudes)]
+        at += len(law.amplitudes)
+    chosen = np.array([0, *free])
+    linear = linearise(likelihood, point, chosen, np.full(len(chosen), 0.01))
+    model = Hypothesis(tuple(laws), simulator, likelihood, Fit(point, linear, chosen, 1e6, 0, True))
+    return Hypothesis(model.laws, simulator, likelihood, model.fit, without(model, laws).fit.linear.residual)
+
+
+def physics(model: Hypothesis, least: float = -1.0) -> list[str]:
+    ((said, odds),) = told_apart({model.name: (model, 0.0)}, least)
+    assert odds == 0.0
+    assert {*said.physics, *said.corrections} == set(model.laws)
+    return [name_of([a]) for a in said.physics]
+
+
+@pytest.mark.parametrize(
+    ("small", "joint", "named"),
+    [
+        (0.02, "j0", ["spring(j0)"]),
+        (0.4, "j0", ["spring(j0)", "cogging(j0)"]),
+        (0.02, "j1", ["spring(j0)", "cogging(j1)"]),
+    ],
+    ids=["a rest of its form", "as large", "on another joint"],
+)
+def test_a_law_is_named_for_its_size_and_for_where_it_pushes(
+    tmp_path: Path, small: float, joint: str, named: list[str]
+) -> None:
+    laws = [on("j0", "spring"), on(joint, "cogging")]
+    numbers = {"stiffness": SPRING, "cosine": 0.0, "sine": small}
+    values = [numbers.get(q.name, q.start) for law in laws for q in law.effect.quantities]
+    model = fitted(tmp_path, laws, values)
+    assert physics(model) == named
+    assert len(physics(model, least=1.0)) == 2  # what is improbable is not looked at
+
+
+def test_models_that_name_the_same_are_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    laws = [on("j0", "spring"), on("j0", "cogging")]
+    numbers = {"stiffness": SPRING, "cosine": 0.0, "sine": 0.02}
+    values = [numbers.get(q.name, q.start) for law in laws for q in law.effect.quantities]
+    both = fitted(tmp_path, laws, values)
+    alone = without(both, laws[1:])
+    models = {both.name: (both, 3.0), alone.name: (alone, 1.0)}
+    ((said, odds),) = told_apart(models, -9.0)
+    assert said.corrections == (laws[1],)
+    assert said.laws == both.laws
+    assert odds == pytest.approx(np.logaddexp(3.0, 1.0))
+    monkeypatch.setattr(form, "RHO", (0.0, 1e-3))  # the number that decides
+    assert [m.name for m, _ in told_apart(models, -9.0)] == [both.name, alone.name]
