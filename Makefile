@@ -43,9 +43,12 @@ demo: install
 
 # Two test processes on two cores: linear algebra must not start threads of its own.
 test: export OMP_NUM_THREADS = 1
-test: lint readers
+test: install readers
+	$(BIN)/ruff check .
+	@# nodes wait for each other most of the time, and mypy takes one core beside them
+	$(BIN)/mypy > $(STAMPS)/mypy.txt 2>&1 & mypy=$$!; $(BIN)/python -m pytest -m ros $(ARGS); nodes=$$?; \
+	wait $$mypy; types=$$?; cat $(STAMPS)/mypy.txt; exit $$((nodes | types))
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not ros and not nightly" $(ARGS)
-	$(BIN)/python -m pytest -m ros $(ARGS)
 
 # What takes half a minute and more, and is not the first to break.
 nightly: install readers

@@ -1,9 +1,9 @@
 """Which laws of a model are physics of their own, and which stand for what the form of the others lacks.
 
 A law is a formula, and nature's is another one: a discrepancy in proportion to it, up to `RHO`, is expected of every
-law and is no physics of its own. A further law that changes the recordings by no more than such a share of what the
-others change, and pushes only where they push, is that discrepancy, written by other means. It stays in the simulator,
-where it is worth its evidence, and is not named.
+law and is no physics of its own. Where laws leave no more than such a share of what they change, a further one that
+pushes only where they push is that discrepancy, written by other means. It stays in the simulator, where it is worth
+its evidence, and is not named.
 """
 
 from __future__ import annotations
@@ -49,12 +49,10 @@ def _corrections(model: Hypothesis, models: Mapping[str, Weighed]) -> tuple[Atta
 
 
 def _less(model: Hypothesis, models: Mapping[str, Weighed]) -> Hypothesis | None:
-    """The model without the law that changes least, where that one corrects the others; None: where none does."""
+    """The model without one of its laws that corrects the others, those that leave least; None: without any."""
     names = dict.fromkeys(a.effect.name for a in model.laws)
-    if len(names) < 2:
-        return None
     found: list[tuple[float, Hypothesis]] = []
-    for name in names:
+    for name in names if len(names) > 1 else ():
         own = [a for a in model.laws if a.effect.name == name]
         others = [a for a in model.laws if a.effect.name != name]
         pushed = model.sizes_of(own) > 0
@@ -62,16 +60,16 @@ def _less(model: Hypothesis, models: Mapping[str, Weighed]) -> Hypothesis | None
             continue  # a scatter has no form, and what acts elsewhere corrects nothing
         known = models.get(name_of(others))
         rest = known[0] if known else without(model, own)
-        found.append((_share(model, rest), rest))
+        found.append((left_over(rest), rest))
     if not found:
         return None
-    share, less = min(found, key=lambda pair: pair[0])
-    return less if share <= max(RHO) else None
+    left, less = min(found, key=lambda pair: pair[0])
+    return less if left <= max(RHO) else None
 
 
-def _share(model: Hypothesis, less: Hypothesis) -> float:
-    """What a model changes beside one with a law less, over what that one changes beside none: rms of what is measured,
-    each at its own fit."""
-    here, there = model.fit.linear.residual, less.fit.linear.residual
-    moved, others = float(np.linalg.norm(here - there)), float(np.linalg.norm(there - model.bare))
-    return moved / others if others > 0 else np.inf
+def left_over(model: Hypothesis) -> float:
+    """What the laws of a model leave above the noise, as a share of what they change: rms of all that is measured."""
+    likelihood = model.likelihood
+    above = max(2 * model.fit.point.cost - likelihood.measurements, 0.0)
+    changed = float(np.linalg.norm(model.bare - model.fit.linear.residual))
+    return float(np.sqrt(above)) / changed if changed > 0 else np.inf

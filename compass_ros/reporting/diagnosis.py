@@ -52,8 +52,8 @@ def print_diagnosis(result: Result, extras: ReportExtras, console: Console | Non
     if result.mismatch.explanations:
         out.print(_explanations(result))
         for row in ranked(result.mismatch):
-            if row.why:
-                out.print(Text(f"  {row.name}: {row.why}", "dim"))
+            for note in row.notes:
+                out.print(Text(f"  {row.name}: {note}", "dim"))
     elif extras.candidates:
         out.print(_candidates(result, extras))
     by_signal = signals(result)

@@ -208,7 +208,8 @@ NOTHING = Explanation((), 1e-130, 7_611.0, HeldOut(0.0196, 0.0196, 0.00101, "m")
 EXPLANATIONS: dict[Verdict, tuple[Explanation, ...]] = {
     "none": (replace(NOTHING, probability=0.98), replace(UNKNOWN, probability=0.02, log_evidence=7_607.0)),
     "named": (
-        explanation("fan_field", 0.994, 7_923.4, 0.00102), explanation("point_attraction", 0.0031, 7_917.7, 0.0064),
+        replace(explanation("fan_field", 0.994, 7_923.4, 0.00102), corrections=explanation("swirl", 0, 0, 0).laws),
+        explanation("point_attraction", 0.0031, 7_917.7, 0.0064),
         UNKNOWN, explanation("fan_field", 9e-4, 7_916.4, 0.0031, "puck2"),
         explanation("swirl", 1e-60, 7_781.2, 0.0151), NOTHING,
     ),

@@ -64,6 +64,16 @@ def test_rows_have_the_numbers_of_the_result_in_its_order() -> None:
     assert [row.kept for row in rows] == [True, True, True, False, False], "these hold 0.99"
 
 
+def test_what_corrects_a_form_is_told_and_is_no_explanation(make_result: Callable[..., Result]) -> None:
+    result = make_result("named")
+    first, *others = ranked(result.mismatch)
+    assert first.name == "fan_field on puck1"
+    assert first.notes == ["its form is corrected by swirl on puck1: less than laws' forms differ by"]
+    assert not any(row.form for row in others)
+    assert first.notes[0].replace("'", "&#39;") in render(result, ReportExtras())
+    assert first.notes[0] in " ".join(printed(result, ReportExtras()).split())
+
+
 @pytest.mark.parametrize(
     ("worse", "odds", "said"),
     [

@@ -66,6 +66,7 @@ def test_a_browser_that_watches_gets_the_last_report(tmp_path: Path, result: Res
         got: list[int] = []
         late = threading.Timer(0.5, lambda: got.append(ask(live, "/report.html")[0]))
         late.start()
+    late.join()
     assert got == [200]
     begun = time.monotonic()
     with LiveReport(tmp_path, 0, computing=True) as live:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from compass_ros.reporting.numbers import NARROW, percent, probability, thousandths
@@ -36,6 +37,13 @@ class Ranked:
     """Whether it is one of the few that hold 1 - alpha of the probability."""
     why: str
     """Why it is less probable than the first; empty where it is not, or not by much."""
+    form: str = ""
+    """What corrects the form of its laws in the simulator; empty where nothing does."""
+
+    @property
+    def notes(self) -> list[str]:
+        """What is said below it."""
+        return [note for note in (self.form, self.why) if note]
 
     @property
     def name(self) -> str:
@@ -69,7 +77,13 @@ def _row(one: Explanation, first: Explanation, kept: bool) -> Ranked:
         errors="" if errors is None else f"{_moved(errors.before, errors.after)}{NARROW}m{errors.unit}",
         kept=kept,
         why=why_less(one, first),
+        form=_form(one.corrections),
     )
+
+
+def _form(corrections: Sequence[ExplainedLaw]) -> str:
+    said = [f"{law.name} on {_sites(law)}" if law.sites else law.name for law in corrections]
+    return f"its form is corrected by {' and '.join(said)}: less than laws' forms differ by" if said else ""
 
 
 def _sites(law: ExplainedLaw) -> str:
