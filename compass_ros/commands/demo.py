@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from compass_ros.cells import Cell
 
 ANSWERS = Path("~/.local/share/compass_ros/answers")
-DEFAULT_EFFECT = "swirl"
+DEFAULT_EFFECT = "anisotropic_friction"
 """What is concealed where neither a seed nor an effect is asked for."""
 
 

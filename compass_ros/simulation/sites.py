@@ -280,8 +280,8 @@ def slides_on_what_stands(model: mujoco.MjModel, site: Site) -> str:
     """Why a body in space cannot slide on anything that stands, with friction; empty: it can, or is another site."""
     if site.kind != "body":
         return ""
-    own = model.geom_bodyid == model.body(site.name).id
-    stands = model.body_weldid[model.geom_bodyid] == 0
+    weld = model.body_weldid[model.geom_bodyid]
+    own, stands = weld == model.body_weldid[model.body(site.name).id], weld == 0
     one, other = model.pair_geom1, model.pair_geom2
     paired = (own[one] & stands[other]) | (own[other] & stands[one])
     one, other = np.flatnonzero(own)[:, None], np.flatnonzero(stands)

@@ -76,8 +76,9 @@ static int sliding_friction(const mjModel* m, mjData* d, const Term* term) {
   for (int i = 0; i < d->ncon; i++) {
     mjContact* c = d->contact + i;
     if (c->efc_address < 0 || c->dim < 3) continue;
-    int a = m->geom_bodyid[c->geom[0]], b = m->geom_bodyid[c->geom[1]];
-    if (!(a == term->id && !m->body_weldid[b]) && !(b == term->id && !m->body_weldid[a])) continue;
+    int a = m->body_weldid[m->geom_bodyid[c->geom[0]]], b = m->body_weldid[m->geom_bodyid[c->geom[1]]];
+    int own = m->body_weldid[term->id];
+    if ((a != own || b) && (b != own || a)) continue;
     double v[3];
     contact_velocity(m, d, c, v);
     Coefficient more = coefficient(term, c->pos, v);

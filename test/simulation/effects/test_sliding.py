@@ -13,6 +13,7 @@ from compass_ros.types import Floats
 
 _AXES = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1"))
 BOX = '<freejoint/><geom type="box" size=".05 .04 .02" mass="1" {}/>'
+ON_FEET = '<freejoint/><body name="foot"><geom type="box" size=".05 .04 .02" mass="1" {}/></body>'
 BALL = _AXES + '<geom type="sphere" size=".02" mass="1" {}/>'
 
 
@@ -51,6 +52,16 @@ def test_a_patch_as_large_as_the_world_is_another_coefficient(cone: str, jacobia
     given = slid(scene(0.4, cone, jacobian, dim, flags), tumbling, 250, (Kind.FRICTION_PATCH, everywhere))
     np.testing.assert_allclose(given, wanted, atol=1e-9)
     assert np.abs(slid(scene(0.4, cone, jacobian, dim, flags), tumbling, 250) - wanted).max() > 0.1
+
+
+def test_a_body_slides_on_what_is_fixed_to_it() -> None:
+    everywhere = [-0.2 * (1 + np.exp(-10)), 0.0, 0.0, 1e9, 0.0, 1.0]
+    given, wanted = (scene(friction, "elliptic", body=ON_FEET) for friction in (0.4, 0.2))
+    site = Places(given).body("box")
+    assert site is not None
+    assert effect("friction_patch").takes(given, site)
+    slides = slid(given, (1.0, 0.5), 250, (Kind.FRICTION_PATCH, everywhere))
+    np.testing.assert_allclose(slides, slid(wanted, (1.0, 0.5), 250), atol=1e-9)
 
 
 @pytest.mark.parametrize("towards", [0.0, 0.4, 1.0, 2.0, 3.0])
