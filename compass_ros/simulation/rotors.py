@@ -36,9 +36,11 @@ def onto_rotor(model: mujoco.MjModel, joint: str, inertia: float, share: float) 
     return tendon, inertia
 
 
-def undriven(model: mujoco.MjModel, site: Site) -> str:
-    """Why a joint has no motor's side; empty: it has one."""
-    return "" if _driving(model, model.joint(site.name).id) else "nothing drives it"
+def rotorless(model: mujoco.MjModel, site: Site) -> str:
+    """Why a joint has no motor's side; empty: it has one, be it without current, for an armature is a rotor's."""
+    joint = model.joint(site.name)
+    has = _driving(model, joint.id) or joint.armature[0] > 0
+    return "" if has else "nothing drives it, and it has no rotor (armature)"
 
 
 def _driving(model: mujoco.MjModel, joint: int) -> list[int]:

@@ -14,7 +14,7 @@ import mujoco
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.effects.joint_elasticity import rotor_of
-from compass_ros.simulation.rotors import onto_rotor, undriven
+from compass_ros.simulation.rotors import onto_rotor, rotorless
 from compass_ros.simulation.sites import JOINTS
 from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize, unit_joint
 from compass_ros.types import Floats
@@ -47,7 +47,7 @@ EFFECT = Effect(
     on=JOINTS,
     model=_model,
     on_joint=_on_joint,
-    unable=undriven,
+    unable=rotorless,
     rotor=True,
     by_name=True,
 )

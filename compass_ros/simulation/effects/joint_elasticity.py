@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
-from compass_ros.simulation.rotors import onto_rotor, undriven
+from compass_ros.simulation.rotors import onto_rotor, rotorless
 from compass_ros.simulation.sites import JOINTS
 from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize, unit_joint
 from compass_ros.types import Floats
@@ -72,7 +72,7 @@ EFFECT = Effect(
     on=JOINTS,
     model=_model,
     on_joint=_on_joint,
-    unable=undriven,
+    unable=rotorless,
     rotor=True,
     by_name=True,
 )
