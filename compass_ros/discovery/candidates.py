@@ -11,6 +11,7 @@ from compass_ros.discovery.sites_asked import Pairs, choices, on_signals
 from compass_ros.discovery.unlisted import unlisted
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached, Effect, Quantity
+from compass_ros.simulation.rotors import actuated
 from compass_ros.simulation.sites import DRIVES, JOINTS, PLANAR, SIGNALS, SiteKind, names_of
 from compass_ros.simulation.sizes import JointSize, alike
 from compass_ros.simulation.visited import Visited
@@ -97,10 +98,15 @@ def candidates(simulator: Simulator, values: Floats, inputs: Floats, time_s: Flo
 
 
 def _on_movers(effect: Effect, simulator: Simulator, joints: Mapping[str, JointSize]) -> Iterator[Attached]:
-    """All movers of a kind together, and each alone; no joint that nothing drives, where the law acts by that force."""
+    """All movers of a kind together, and each alone; no joint that nothing drives, where the law acts by that force.
+
+    Nothing between joint and rotor, where recorded forces are applied to the joint: they would pass the rotor by.
+    """
     places = simulator.places
     able = [site for site in simulator.moving.values() if effect.takes(places.model, site)]
     able = [site for site in able if not effect.loaded or joints[site.name].drive > 0]
+    if effect.rotor:
+        able = [site for site in able if joints[site.name].drive == 0 or actuated(places.model, site.name)]
     for kinds in ALIKE:
         alike_ones = [site for site in able if site.kind in kinds]
         for sites in choices(effect, alike_ones):

@@ -38,9 +38,13 @@ def onto_rotor(model: mujoco.MjModel, joint: str, inertia: float, share: float) 
 
 def rotorless(model: mujoco.MjModel, site: Site) -> str:
     """Why a joint has no motor's side; empty: it has one, be it without current, for an armature is a rotor's."""
-    joint = model.joint(site.name)
-    has = _driving(model, joint.id) or joint.armature[0] > 0
+    has = actuated(model, site.name) or model.joint(site.name).armature[0] > 0
     return "" if has else "nothing drives it, and it has no rotor (armature)"
+
+
+def actuated(model: mujoco.MjModel, joint: str) -> bool:
+    """Whether an actuator acts on a joint itself: on its motor's side, where it has one."""
+    return bool(_driving(model, model.joint(joint).id))
 
 
 def _driving(model: mujoco.MjModel, joint: int) -> list[int]:

@@ -240,3 +240,13 @@ def test_a_table_that_is_loaded_again_is_asked_the_same() -> None:
     assert [(c.name, c.attached.objects) for c in one] == [(c.name, c.attached.objects) for c in other]
     assert len(one) > 60
     assert table().name == "air_hockey"
+
+
+def test_a_gear_is_asked_of_a_joint_that_has_a_rotor(tmp_path: Path) -> None:
+    """A motor without current still turns behind its gear; a bare hinge has none."""
+    arm, bare = Simulator(load("two_joint_arm"), threads=1), Simulator(robot(tmp_path, ("hinge",)), threads=1)
+    of_arm = asked(arm, np.array([[0.5, 0.3, 0.0, 0.0], [1.0, -0.4, 0.0, 0.0]]))  # first angles and rates
+    of_bare = asked(bare, shots(bare.cell, 2))
+    for name in ("backlash", "joint_elasticity"):
+        assert named(of_arm, name) == [("shoulder",), ("elbow",)]
+        assert not named(of_bare, name)
