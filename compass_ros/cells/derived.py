@@ -87,3 +87,13 @@ def _radius(kind: int, size: Floats) -> float:
     if kind == _GEOM.mjGEOM_CYLINDER:
         return float(np.hypot(size[0], size[1]))
     return float(size.max() if kind == _GEOM.mjGEOM_ELLIPSOID else np.linalg.norm(size))
+
+
+def set_const(model: mujoco.MjModel, data: mujoco.MjData | None = None) -> None:
+    """What MuJoCo derives from a model's numbers, with welds and other equalities as they were compiled or written.
+
+    Since MuJoCo 4.0 `mj_setConst` measures them anew where the bodies are by then, a mocap body at its keyframe too.
+    """
+    equalities = model.eq_data.copy()
+    mujoco.mj_setConst(model, mujoco.MjData(model) if data is None else data)
+    model.eq_data[:] = equalities

@@ -52,7 +52,7 @@ def _model(
         if signals:
             add_sensors(spec, _model(path, content)[0], signals, where)
         for name in simple:
-            _nudge(spec.body(name), _model(path, content)[0].body(name))
+            _not_simple(spec.body(name), _model(path, content)[0].body(name))
         model = spec.compile()
     except ValueError as error:
         raise ConfigError(f"{path}: {' '.join(str(error).split())}") from error
@@ -76,8 +76,12 @@ def _tuned_though_simple(nominal: mujoco.MjModel, parameters: Sequence[Parameter
     return tuple(n for n in dict.fromkeys(tuned) if n in known and nominal.body_simple[nominal.body(n).id])
 
 
-def _nudge(body: mujoco.MjsBody, own: object) -> None:
-    """Place a body's centre a little beside its frame, whatever its inertia was read from."""
+def _not_simple(body: mujoco.MjsBody, own: object) -> None:
+    """Let MuJoCo take a body's inertia for a full matrix: by saying so, and before MuJoCo 4.0 by placing its centre a
+    little beside its frame, whatever its inertia was read from."""
+    if hasattr(body, "simple"):
+        body.simple = 0
+        return
     body.explicitinertial = True
     body.mass, body.inertia, body.iquat = float(own.mass[0]), own.inertia, own.iquat  # type: ignore[attr-defined]
     body.ipos = own.ipos + _NUDGE_M  # type: ignore[attr-defined]

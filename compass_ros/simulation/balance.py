@@ -8,6 +8,7 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
+from compass_ros.cells.derived import set_const
 from compass_ros.cells.dynamics import Dynamics
 from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.effect import Context
@@ -48,7 +49,7 @@ class Balance:
         """(R,) forces and sensors at all moments less those of the model itself, as shares of what is typical."""
         other = copy.copy(self._model)
         change(other)
-        mujoco.mj_setConst(other, mujoco.MjData(other))
+        set_const(other)
         return (self._needed(other) - self._here).ravel()
 
     def _needed(self, model: mujoco.MjModel) -> Floats:

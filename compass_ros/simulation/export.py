@@ -39,6 +39,7 @@ def write_scene(cell: Cell, values: Floats, path: Path) -> None:
     spec.compiler.saveinertial = True  # else MuJoCo computes masses from the drawing again
     spec.comment = spec.comment.replace("--", "- -")  # MuJoCo reads that, XML has no such comment
     model = _calibrated(spec, cell, values)
+    _as_stated(spec)
     with _digits(_EXACT):
         save_numbers(spec, model, path)
     root = ElementTree.parse(path).getroot()
@@ -66,6 +67,16 @@ def _calibrated(spec: mujoco.MjSpec, cell: Cell, values: Floats) -> mujoco.MjMod
         model = spec.compile()
         dynamics.apply([model], values[None])
     return model
+
+
+def _as_stated(spec: mujoco.MjSpec) -> None:
+    """Let a scene hold masses as they are stated, where it took them from its geoms or scaled them to a total.
+
+    MuJoCo 4.0 does not take changed ones for such a scene otherwise; before, what it writes says the same.
+    """
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
+    spec.compiler.settotalmass = -1
+    spec.compile()
 
 
 def _with_files(root: ElementTree.Element, files: SceneFiles, meshes: str, textures: str) -> dict[Path, str]:

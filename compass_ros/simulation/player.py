@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import mujoco
 from mujoco.rollout import Rollout
 
+from compass_ros.cells.derived import set_const
 from compass_ros.simulation.native.program import Programs
 from compass_ros.simulation.physics import Physics
 from compass_ros.simulation.rotors import carry
@@ -45,7 +46,7 @@ class Player:
         models = self._models[: len(values)]
         physics.write(models, values)
         for model in models:
-            mujoco.mj_setConst(model, self._scratch)
+            set_const(model, self._scratch)
         return models
 
     def carry(self, physics: Physics, values: Floats, start: Floats) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from compass_ros.cells.derived import set_const
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.effects.effect import Context, restore, table_friction
 from compass_ros.simulation.effects.exported import Exported, FittedEffect
@@ -53,7 +54,7 @@ def attach(model: mujoco.MjModel, data: mujoco.MjData, exported: Exported) -> At
     except ConfigError:
         restore(model, before)
         raise
-    mujoco.mj_setConst(model, copy.copy(data))
+    set_const(model, copy.copy(data))
     carry(model, data)
     mujoco.mj_forward(model, data)
     return Attachment(model, before, programs)
@@ -82,4 +83,4 @@ def context_in(places: Places, exported: Exported, fitted: FittedEffect) -> Cont
 def _end(model: mujoco.MjModel, before: mujoco.MjModel, programs: Programs) -> None:
     programs.__exit__()
     restore(model, before)
-    mujoco.mj_setConst(model, mujoco.MjData(model))
+    set_const(model)
