@@ -17,7 +17,6 @@ from scipy.optimize import lsq_linear
 
 from compass_ros.calibration.cost import robust_weight
 from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.evidence import Tangent
 from compass_ros.discovery.response import Response
 from compass_ros.discovery.shapes import best_shapes, shape_grid
 from compass_ros.types import Floats, Ints
@@ -57,11 +56,9 @@ Products = tuple[Floats, Floats, Floats]
 class FirstOrder:
     """All laws about one response."""
 
-    def __init__(self, response: Response, tangent: Tangent | None = None) -> None:
-        """`tangent`: another linear model about the same motion, for laws of forces alone; None: the response's."""
+    def __init__(self, response: Response) -> None:
         self.response = response
-        self.tangent = tangent = tangent or response.tangent
-        gram = tangent.normal.gram
+        tangent, gram = response.tangent, response.tangent.normal.gram
         p, numbers = tangent.parameters.shape[2], tangent.own.shape[2]
         own = slice(p, p + numbers)
         inner = gram[:, own, own] + np.eye(numbers)
@@ -99,7 +96,7 @@ class FirstOrder:
 
     def of_columns(self, columns: Floats) -> tuple[Floats, Floats]:
         """The same of (E, D, n) changes of the residual."""
-        tangent, p = self.tangent, self._parameters
+        tangent, p = self.response.tangent, self._parameters
         weighted = columns * self._weight[:, :, None]
         with_own = tangent.own.transpose(0, 2, 1) @ weighted
         taken = self._taken @ with_own
@@ -165,7 +162,7 @@ class FirstOrder:
         for shapes in best_shapes(quantities, lambda one: amplitudes(law(one))[1], STARTS, EVALUATIONS):
             units, numbers = law(shapes), shapes.copy()
             numbers[candidate.amplitudes], gain = amplitudes(units)
-            columns = self.tangent.pushes[:, :, pushes] @ (WIDTH * units)
+            columns = self.response.tangent.pushes[:, :, pushes] @ (WIDTH * units)
             found.append(self._judged(candidate, numbers, columns, gain))
         return found
 

@@ -218,27 +218,6 @@ def finished(hypothesis: Hypothesis) -> Hypothesis:
 
 def without(model: Hypothesis, laws: Sequence[Attached]) -> Hypothesis:
     """The same model fitted without some of its laws."""
-    less = _bare_of(model, laws)
-    fit = minimise(less.likelihood, less.fit.point, less.fit.free, FEW, model.fit.robust, _LAST, less.fit.linear)
-    return replace(less, fit=fit)
-
-
-def in_place(model: Hypothesis, laws: Sequence[Attached], ranked: Ranked) -> Hypothesis:
-    """A model fitted with another law in the place of some of its own: from its own fit, near which its differences
-    hold, with the other's first-order numbers."""
-    less, new = _bare_of(model, laws), ranked.candidate.parts
-    simulator, likelihood = widened(less.simulator, less.likelihood, new)
-    values = np.concatenate([less.fit.point.values, ranked.numbers])
-    free, steps = _with_law(less, values)
-    point = Point(np.clip(values, likelihood.low, likelihood.high), model.fit.point.launch, np.inf)
-    (residual,) = cost(likelihood, [point], model.fit.robust)[1]
-    linear = extended(less.fit.linear, likelihood, point, residual, free)
-    fit = minimise(likelihood, point, free, FEW, model.fit.robust, _LAST, linear, steps=steps)
-    return Hypothesis((*less.laws, *new), simulator, likelihood, fit, without=model.bare)
-
-
-def _bare_of(model: Hypothesis, laws: Sequence[Attached]) -> Hypothesis:
-    """The model without some of its laws where it stands, with its own differences there: no fit of that one."""
     kept = [attached for attached in model.laws if attached not in laws]
     numbers = [np.arange(own.start, own.stop) for attached, own in model.own() if attached in kept]
     cell = len(model.simulator.cell.parameters)
@@ -256,5 +235,5 @@ def _bare_of(model: Hypothesis, laws: Sequence[Attached]) -> Hypothesis:
     point = replace(model.fit.point, values=model.fit.point.values[at], cost=np.inf)
     free = np.flatnonzero(np.isin(at, model.fit.free))
     linear = model.fit.linear.only(np.isin(model.fit.free, at))
-    return Hypothesis(tuple(kept), simulator, likelihood, replace(model.fit, point=point, linear=linear, free=free),
-                      without=model.bare)  # fmt: skip
+    fit = minimise(likelihood, point, free, FEW, model.fit.robust, _LAST, linear)
+    return Hypothesis(tuple(kept), simulator, likelihood, fit, without=model.bare)

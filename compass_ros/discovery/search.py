@@ -21,7 +21,6 @@ from compass_ros.discovery.hypothesis import Hypothesis, name_of
 from compass_ros.discovery.neighbours import exchange, rank, widen
 from compass_ros.discovery.odds import Known, Prior
 from compass_ros.discovery.settings import PRIOR_UNKNOWN, RHO, RHO_PRIOR, SLIGHT
-from compass_ros.discovery.swaps import swap
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
 
@@ -65,11 +64,9 @@ def search(
         return found
     known = Known(prior, none, {}, set())
     best, top, ranked, widened = plain, 0.0, list(first), {plain.name}
-    others, least, swapped = (0.0, found.unknown), -np.inf, set[str]()
+    others, least = (0.0, found.unknown), -np.inf
     while ranked:
         widen(known, best, ranked, found.unknown > 0)
-        finish(known, others)
-        in_other_words(known, candidates, swapped)
         finish(known, others)
         exchange(known, candidates, widened, found.unknown > 0, least)
         finish(known, others)
@@ -91,15 +88,6 @@ def search(
     total = log_sum(np.array([*others, *(odds for _, odds in known.models.values())]))
     models = told_apart(known.models, total + log(SLIGHT))
     return Found(plain, found.unknown, tuple(h for h, _ in models), tuple(o for _, o in models), tuple(first))
-
-
-def in_other_words(known: Known, candidates: Sequence[Candidate], swapped: set[str]) -> None:
-    """Fit other laws in the place of the best model's, until none is better. `swapped`: models for which that was done;
-    those of this search are added."""
-    while known.ordered and known.ordered[0][0].name not in swapped:
-        leader, _ = known.ordered[0]
-        swapped.add(leader.name)
-        swap(known, leader, candidates)
 
 
 def finish(known: Known, others: Sequence[float]) -> None:

@@ -111,7 +111,7 @@ def test_adhesion_is_seen_where_a_foot_sticks(tmp_path: Path) -> None:
         pytest.param("joint_elasticity", "e", {"compliance": 2.0}, marks=pytest.mark.nightly),
         ("backlash", "e", {"play": 1.0}),
         pytest.param("torque_saturation", "ds", {"inverse_limit": 15.0}, marks=pytest.mark.nightly),
-        ("payload", "fore", {"mass": 15.0, "moment_x": 3.0, "moment_z": -8.0}),
+        pytest.param("payload", "fore", {"mass": 15.0, "moment_x": 3.0, "moment_z": -8.0}, marks=pytest.mark.nightly),
         pytest.param("gravity_tilt", "upper+fore", {"tilt_x": 2.0}, marks=pytest.mark.nightly),
         pytest.param("adhesion", "pad+foot", {"force": 10.0}, marks=pytest.mark.nightly),
     ],

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from compass_ros.calibration.cost import Point
+from compass_ros.calibration.cost import Point, cost
 from compass_ros.calibration.differences import linearise
 from compass_ros.calibration.least_squares import Fit
 from compass_ros.discovery import form
@@ -26,11 +27,11 @@ def on(joint: str, name: str) -> Attached:
     return Attached(effect(name).at(unit_joint("hinge")), (joint,))
 
 
-def fitted(folder: Path, laws: list[Attached], numbers: list[float]) -> Hypothesis:
-    """The model of two swinging joints that has the laws, at their true numbers."""
+def fitted(folder: Path, laws: list[Attached], numbers: list[float], beyond: float) -> Hypothesis:
+    """The model of two swinging joints that has the laws, at their true numbers; what is recorded also has `beyond`."""
     cell = robots.robot(folder, ("hinge", "hinge"))
     plain, inputs = Simulator(cell, threads=1), robots.shots(cell, 4)
-    likelihood = robots.recorded(plain, laws, numbers, inputs)
+    likelihood = robots.recorded(plain, [*laws, on("j0", "viscous_drag")], [*numbers, beyond], inputs)
     simulator, likelihood = widened(plain, likelihood, laws)
     point, free = Point(np.array([*plain.defaults, *numbers]), np.zeros_like(inputs), 0.0), []
     at = len(plain.defaults)
@@ -39,6 +40,7 @@ def fitted(folder: Path, laws: list[Attached], numbers: list[float]) -> Hypothes
         at += len(law.amplitudes)
     chosen = np.array([0, *free])
     linear = linearise(likelihood, point, chosen, np.full(len(chosen), 0.01))
+    point = replace(point, cost=float(cost(likelihood, [point], 1e6)[0][0]))
     model = Hypothesis(tuple(laws), simulator, likelihood, Fit(point, linear, chosen, 1e6, 0, True))
     return Hypothesis(model.laws, simulator, likelihood, model.fit, without(model, laws).fit.linear.residual)
 
@@ -51,21 +53,23 @@ def physics(model: Hypothesis, least: float = -1.0) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("small", "joint", "named"),
+    ("small", "joint", "beyond", "named"),
     [
-        (0.02, "j0", ["spring(j0)"]),
-        (0.4, "j0", ["spring(j0)", "cogging(j0)"]),
-        (0.02, "j1", ["spring(j0)", "cogging(j1)"]),
+        (0.02, "j0", 2e-3, ["spring(j0)"]),
+        (0.4, "j0", 2e-3, ["spring(j0)", "cogging(j0)"]),
+        (0.02, "j1", 2e-3, ["spring(j0)", "cogging(j1)"]),
+        (0.02, "j0", 0.0, ["spring(j0)", "cogging(j0)"]),
+        (1e-5, "j0", 0.0, ["spring(j0)"]),
     ],
-    ids=["a rest of its form", "as large", "on another joint"],
+    ids=["a rest of its form", "as large", "on another joint", "all that is left", "nothing was left"],
 )
 def test_a_law_is_named_for_its_size_and_for_where_it_pushes(
-    tmp_path: Path, small: float, joint: str, named: list[str]
+    tmp_path: Path, small: float, joint: str, beyond: float, named: list[str]
 ) -> None:
     laws = [on("j0", "spring"), on(joint, "cogging")]
     numbers = {"stiffness": SPRING, "cosine": 0.0, "sine": small}
     values = [numbers.get(q.name, q.start) for law in laws for q in law.effect.quantities]
-    model = fitted(tmp_path, laws, values)
+    model = fitted(tmp_path, laws, values, beyond)
     assert physics(model) == named
     assert len(physics(model, least=1.0)) == 2  # what is improbable is not looked at
 
@@ -74,7 +78,7 @@ def test_models_that_name_the_same_are_one(tmp_path: Path, monkeypatch: pytest.M
     laws = [on("j0", "spring"), on("j0", "cogging")]
     numbers = {"stiffness": SPRING, "cosine": 0.0, "sine": 0.02}
     values = [numbers.get(q.name, q.start) for law in laws for q in law.effect.quantities]
-    both = fitted(tmp_path, laws, values)
+    both = fitted(tmp_path, laws, values, 2e-3)
     alone = without(both, laws[1:])
     models = {both.name: (both, 3.0), alone.name: (alone, 1.0)}
     ((said, odds),) = told_apart(models, -9.0)

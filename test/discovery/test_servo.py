@@ -93,7 +93,7 @@ def test_two_laws_on_a_servo_are_both_named(tmp_path: Path) -> None:
             *(("hinge", "slide", "hinge"), ("intvelocity", "muscle", "general"), "coulomb_friction", "j2", [0.07, 0.0]),
             marks=pytest.mark.nightly,
         ),
-        (("hinge",) * 3, ("position",) * 3, "viscous_drag", "j1", [0.16]),
+        pytest.param(("hinge",) * 3, ("position",) * 3, "viscous_drag", "j1", [0.16], marks=pytest.mark.nightly),
     ],
 )
 def test_a_law_on_one_joint_of_an_arm_is_named_on_that_joint(

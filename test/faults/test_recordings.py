@@ -62,14 +62,14 @@ def test_one_episode(sound: list[Episode], tmp_path: Path) -> None:
     assert finite(result)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_identical_episodes(sound: list[Episode], tmp_path: Path) -> None:
     result = calibrated([replace(sound[0], name=f"copy{i}") for i in range(4)], tmp_path)
     assert any("3 of 4 episodes are copies of others" in said for said in result["warnings"])
     assert finite(result)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_puck_that_never_moves(sound: list[Episode], tmp_path: Path) -> None:
     def still(episode: Episode) -> Episode:
         tracks = [
@@ -96,6 +96,7 @@ main()
 """
 
 
+@pytest.mark.nightly
 def test_a_bag_deleted_while_others_are_read(sound: list[Episode], tmp_path: Path) -> None:
     """One of many bags goes away under the reader: the result is that of the others, and names it."""
     bags = tmp_path / "bags"

@@ -121,7 +121,7 @@ def test_cell_and_scene_fit_each_other(name: str) -> None:
     assert scene_of(name) is not None
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_sealed_world_reads_back(tmp_path: Path) -> None:
     answers = tmp_path / "answers"
     write_world("two_joint_arm_driven", Asked(5, "none"), tmp_path / "world", answers)
