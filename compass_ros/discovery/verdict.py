@@ -86,7 +86,7 @@ class Judge:
         """The smallest set of models that holds 1 - alpha, the most probable first.
 
         A law that all of them share is sure, whatever else may be: where models with exactly the laws that are sure
-        (posterior inclusion probability, Barbieri and Berger 2004) were fitted, the set is one of these.
+        (posterior inclusion probability, Barbieri and Berger 2004) hold more than alpha, the set is one of these.
         """
         names = [frozenset(a.effect.name for a in m.physics) for m in self.found.models]
         sure = frozenset(
@@ -95,6 +95,8 @@ class Judge:
             if sum(p for p, own in zip(of_models, names, strict=True) if name in own) >= 1 - self.alpha
         )
         chosen = [i for i, own in enumerate(names) if own == sure] if sure else []
+        if sum(of_models[i] for i in chosen) <= self.alpha:
+            chosen = []  # refuted: something has to be beside them, and which is open
         order = sorted(chosen or range(len(names)), key=lambda i: -of_models[i])
         of_order = np.array([of_models[i] for i in order])
         held = np.cumsum(of_order) / (of_order.sum() if chosen else 1.0)
