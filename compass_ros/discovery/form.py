@@ -17,16 +17,11 @@ import numpy as np
 from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.fits import without
 from compass_ros.discovery.hypothesis import Hypothesis, name_of
-from compass_ros.discovery.settings import RHO
+from compass_ros.discovery.settings import AT_NOISE, RHO
 from compass_ros.simulation.effects import Attached
 
 Weighed = tuple[Hypothesis, float]
 """A model and its log posterior odds."""
-
-
-AT_NOISE = 1.1
-"""Mean square of what a fit leaves, over the noise's, up to which it is at the noise: of fits at the laws that were
-there it is 0.82 to 1.0 on the worlds of docs/proof-scenes.md, so noise is known to some five per cent."""
 
 
 def told_apart(models: Mapping[str, Weighed], least: float) -> list[Weighed]:
