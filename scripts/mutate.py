@@ -37,7 +37,6 @@ MUTATIONS = (
     Mutation("settings.py", "FREE", "(1e-9, 2e-9)"),
     Mutation("settings.py", "PRIOR_UNKNOWN", "50.0"),
     Mutation("settings.py", "PRIOR_LAW", "-5000.0"),
-    Mutation("settings.py", "AT_NOISE", "1e9"),
     Mutation("hypothesis.py", "ERROR_BARS", "1e3"),
     Mutation("first_order.py", "WIDTH", "0.02"),
     Mutation("neighbours.py", "SLIGHT", "1.0"),

@@ -9,47 +9,41 @@ its evidence, and is not named.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from compass_ros.discovery.evidence import log_sum
-from compass_ros.discovery.fits import without
-from compass_ros.discovery.hypothesis import Hypothesis, name_of
-from compass_ros.discovery.settings import AT_NOISE, RHO
+from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.odds import Known, Weighed
+from compass_ros.discovery.settings import RHO, SLIGHT
 from compass_ros.simulation.effects import Attached
 
-Weighed = tuple[Hypothesis, float]
-"""A model and its log posterior odds."""
 
-
-def told_apart(models: Mapping[str, Weighed], least: float) -> list[Weighed]:
-    """Models by name, those that name the same laws as one: its most probable member, with the odds of all.
+def told_apart(known: Known, least: float) -> list[Weighed]:
+    """Models, those that name the same laws as one: its most probable member, with the odds of all.
 
     Models below `least` log odds keep all their laws.
     """
     groups: dict[frozenset[tuple[str, tuple[str, ...]]], list[Weighed]] = {}
-    for model, odds in models.values():
-        said = replace(model, corrections=_corrections(model, models)) if odds >= least else model
+    for model, odds in known.ordered:
+        said = replace(model, corrections=_corrections(known, model)) if odds >= least else model
         key = frozenset((a.effect.name, a.objects) for a in said.physics)
         groups.setdefault(key, []).append((said, odds))
-    merged: list[Weighed] = []
-    for group in groups.values():
-        best, _ = max(group, key=lambda weighed: weighed[1])
-        merged.append((best, log_sum(np.array([odds for _, odds in group]))))
+    merged = [(group[0][0], log_sum(np.array([odds for _, odds in group]))) for group in groups.values()]
     return sorted(merged, key=lambda weighed: -weighed[1])
 
 
-def _corrections(model: Hypothesis, models: Mapping[str, Weighed]) -> tuple[Attached, ...]:
+def _corrections(known: Known, model: Hypothesis) -> tuple[Attached, ...]:
     """Laws of a model that correct the form of its others, the least of them first as long as there are any."""
     kept = model
-    while less := _less(kept, models):
+    while less := _less(known, kept):
         kept = less
     return tuple(a for a in model.laws if a not in kept.laws)
 
 
-def _less(model: Hypothesis, models: Mapping[str, Weighed]) -> Hypothesis | None:
+def _less(known: Known, model: Hypothesis) -> Hypothesis | None:
     """The model without one of its laws that corrects the others, those that leave least; None: without any."""
     names = dict.fromkeys(a.effect.name for a in model.laws)
     found: list[tuple[float, Hypothesis]] = []
@@ -59,14 +53,19 @@ def _less(model: Hypothesis, models: Mapping[str, Weighed]) -> Hypothesis | None
         pushed = model.sizes_of(own) > 0
         if not np.any(pushed) or np.any(model.sizes_of(others)[pushed] == 0):
             continue  # a scatter has no form, and what acts elsewhere corrects nothing
-        known = models.get(name_of(others))
-        rest = known[0] if known else without(model, own)
-        if model.chi_square > AT_NOISE or rest.chi_square <= AT_NOISE:
-            found.append((left_over(rest), rest))
+        rest = known.without(model, own)
+        if rest and (at_noise(rest[0]) or not at_noise(model)):
+            found.append((left_over(rest[0]), rest[0]))
     if not found:
         return None
     left, less = min(found, key=lambda pair: pair[0])
     return less if left <= max(RHO) else None
+
+
+def at_noise(model: Hypothesis) -> bool:
+    """Whether the mean square of what a fit leaves is one that the noise itself exceeds with probability SLIGHT."""
+    independent = model.likelihood.measurements / model.likelihood.correlation_time
+    return bool(model.chi_square * independent <= chi2.isf(SLIGHT, independent))
 
 
 def left_over(model: Hypothesis) -> float:

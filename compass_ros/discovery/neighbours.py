@@ -10,7 +10,7 @@ import numpy as np
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.discrepancy import to_first_order
 from compass_ros.discovery.first_order import FirstOrder, Ranked
-from compass_ros.discovery.fits import Begun, from_parent, race, telling, whole, without
+from compass_ros.discovery.fits import Begun, from_parent, race, telling, whole
 from compass_ros.discovery.hypothesis import Hypothesis, name_of
 from compass_ros.discovery.odds import Known, Prior
 from compass_ros.discovery.scatter import ranked_scatter, with_scatter
@@ -77,11 +77,10 @@ def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str], c
             if rest in widened:
                 continue
             widened.add(rest)
-            if rest not in known.models:
-                known.take([without(leader, own)])
-            if rest not in known.models:
-                continue  # another of its laws is zero without this one
-            less, of_less = known.models[rest]
+            known_rest = known.without(leader, own)
+            if known_rest is None:
+                continue
+            less, of_less = known_rest
             ranked = rank(FirstOrder(less.response), candidates)
             worth = max(odds, least)
             better = [r for r in ranked if of_less + r.gain + known.prior.of_laws([r.candidate.name]) > worth]

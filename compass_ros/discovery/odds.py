@@ -7,9 +7,17 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import log
 
+import numpy as np
+
 from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.evidence import log_sum
+from compass_ros.discovery.fits import without
+from compass_ros.discovery.hypothesis import Hypothesis, name_of
 from compass_ros.discovery.settings import PRIOR_LAW
+from compass_ros.simulation.effects import Attached
+
+Weighed = tuple[Hypothesis, float]
+"""A model and its log posterior odds against the plain one."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +64,7 @@ class Known:
     prior: Prior
     plain: float
     """Log evidence of the plain model."""
-    models: dict[str, tuple[Hypothesis, float]]
+    models: dict[str, Weighed]
     finished: set[str]
     """Names of those that were brought to their optimum; one that is not among the models has a law that is zero."""
 
@@ -72,7 +80,18 @@ class Known:
             if model.name not in self.models or odds > self.models[model.name][1]:
                 self.models[model.name] = (model, odds)
 
+    def without(self, model: Hypothesis, laws: Sequence[Attached]) -> Weighed | None:
+        """A model without some of its laws, fitted if it is not known; None: another of its laws is zero then."""
+        name = name_of([a for a in model.laws if a not in laws])
+        if name not in self.models:
+            self.take([without(model, laws)])
+        return self.models.get(name)
+
+    def total(self, others: Iterable[float]) -> float:
+        """Log odds of all models together, and of `others`."""
+        return log_sum(np.array([*others, *(odds for _, odds in self.models.values())]))
+
     @property
-    def ordered(self) -> list[tuple[Hypothesis, float]]:
+    def ordered(self) -> list[Weighed]:
         """The most probable first."""
         return sorted(self.models.values(), key=lambda one: -one[1])

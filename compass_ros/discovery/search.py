@@ -15,13 +15,12 @@ import numpy as np
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.first_order import FirstOrder, Ranked
-from compass_ros.discovery.fits import finished, without
+from compass_ros.discovery.fits import finished
 from compass_ros.discovery.form import told_apart
-from compass_ros.discovery.hypothesis import Hypothesis, name_of
+from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.neighbours import exchange, rank, widen
 from compass_ros.discovery.odds import Known, Prior
 from compass_ros.discovery.settings import PRIOR_UNKNOWN, RHO, RHO_PRIOR, SLIGHT
-from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
 
 DEEPEST = 3
@@ -85,8 +84,7 @@ def search(
             break  # no law more could come up to a free discrepancy
         if len(names) + 1 == DEEPEST:  # what stays below it there stays below it
             ranked, least = could, found.unknown
-    total = log_sum(np.array([*others, *(odds for _, odds in known.models.values())]))
-    models = told_apart(known.models, total + log(SLIGHT))
+    models = told_apart(known, known.total(others) + log(SLIGHT))
     return Found(plain, found.unknown, tuple(h for h, _ in models), tuple(o for _, o in models), tuple(first))
 
 
@@ -103,26 +101,20 @@ def finish(known: Known, others: Sequence[float]) -> None:
     while (name := _unfinished(known, others)) is not None:
         begun, odds = known.models.pop(name)
         known.finished.add(name)
-        if len(begun.laws) > 1 and (weakest := begun.weakest) and _less(known, begun, weakest) >= odds:
-            continue  # its optimum is not worth the search for it
+        if len(begun.laws) > 1 and (weakest := begun.weakest):
+            less = known.without(begun, [weakest])
+            if less and less[1] >= odds:
+                continue  # its optimum is not worth the search for it
         model = finished(begun)
         if (weakest := model.weakest) is None:
             known.models[name] = model, known.odds(model, model.log_evidence)
         elif len(model.laws) > 1:
-            _less(known, model, weakest)
-
-
-def _less(known: Known, model: Hypothesis, law: Attached) -> float:
-    """Log odds of a model without one of its laws, fitted if it is not known; -inf: another one is zero there."""
-    name = name_of([a for a in model.laws if a is not law])
-    if name not in known.models:
-        known.take([without(model, [law])])
-    return known.models[name][1] if name in known.models else -np.inf
+            known.without(model, [weakest])
 
 
 def _unfinished(known: Known, others: Sequence[float]) -> str | None:
     """The most probable model that holds a share of the probability and is not at its optimum; None: there is none."""
-    total = log_sum(np.array([*others, *(odds for _, odds in known.models.values())]))
+    total = known.total(others)
     rest, found = -np.inf, None
     for name, (_, odds) in sorted(known.models.items(), key=lambda item: item[1][1]):
         rest = np.logaddexp(rest, odds)  # of this one and all less probable ones

@@ -24,6 +24,3 @@ KEPT = 1e-3
 SLIGHT = 0.01
 """Probability that is left to models that are not fitted any further: a budget. It is the default false-alarm rate and
 does not follow that setting."""
-AT_NOISE = 1.1
-"""Mean square of what a fit leaves, over the noise's, up to which it is at the noise: of fits at the laws that were
-there it is 0.82 to 1.0 on the worlds of docs/proof-scenes.md, so noise is known to some five per cent."""

@@ -117,15 +117,9 @@ def value_of(finding: EffectFinding, attached: Attached, told: bool) -> str:
 
 
 def corrected(laws: Sequence[Attached]) -> str:
-    """What stands for the rest of a law's form: '; a spring corrects the form'."""
-    said = " and ".join(
-        dict.fromkeys(a.effect.sentence if a.effect.on != ("field",) else "a number of the scene" for a in laws)
-    )
-    return (
-        f"; {said} {'corrects' if len({a.effect.name for a in laws}) == 1 else 'correct'} the form of that"
-        if laws
-        else ""
-    )
+    """What stands for the rest of a law's form: '; its form is corrected by a spring'; empty where nothing does."""
+    said = dict.fromkeys("a number of the scene" if a.effect.on == ("field",) else a.effect.sentence for a in laws)
+    return f"; its form is corrected by {listed(tuple(said))}" if said else ""
 
 
 def errors(before: float, after: float, floor: float, unit: Unit) -> str:

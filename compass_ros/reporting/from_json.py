@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -119,14 +119,13 @@ def _mismatch(said: Json) -> Mismatch:
 
 
 def _explanation(said: Json) -> Explanation:
-    laws, corrections = (
-        tuple(
-            ExplainedLaw(law["name"], tuple(law["sites"]), _quantities(law["quantities"])) for law in said.get(kind, ())
-        )
-        for kind in ("laws", "corrections")
-    )
+    laws, corrections = _laws(said["laws"]), _laws(said.get("corrections", ()))
     held_out = _held_out(said["held_out"]) if said.get("held_out") is not None else None
     return Explanation(laws, said["probability"], _number(said["log_evidence"]), held_out, corrections)
+
+
+def _laws(said: Sequence[Json]) -> tuple[ExplainedLaw, ...]:
+    return tuple(ExplainedLaw(law["name"], tuple(law["sites"]), _quantities(law["quantities"])) for law in said)
 
 
 def _held_out(said: Json) -> HeldOut:

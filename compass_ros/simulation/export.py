@@ -75,8 +75,9 @@ def _as_stated(spec: mujoco.MjSpec) -> None:
     MuJoCo 4.0 does not take changed ones for such a scene otherwise; before, what it writes says the same.
     """
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
-    spec.compiler.settotalmass = -1
-    spec.compile()
+    if spec.compiler.settotalmass > 0:
+        spec.compiler.settotalmass = -1
+        spec.compile()
 
 
 def _with_files(root: ElementTree.Element, files: SceneFiles, meshes: str, textures: str) -> dict[Path, str]:

@@ -17,7 +17,8 @@ import numpy as np
 from compass_ros.cells.auto_rules import candidates
 from compass_ros.cells.candidate import Candidate
 from compass_ros.errors import nearest
-from compass_ros.types import Bools, Ints, SiteWord
+from compass_ros.simulation.contacts import masks_meet
+from compass_ros.types import SiteWord
 
 SiteKind = Literal[
     "hinge",
@@ -77,8 +78,6 @@ _WORDS: dict[SiteKind, str] = {
     "sensor": "other sensor",
     "field": "number",
 }
-_WITH_FRICTION = 3
-"""Dimensions of a contact that has friction: MuJoCo's condim."""
 _SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
 ONE_DOF = (_HINGE, _SLIDE)
 OF_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
@@ -273,28 +272,7 @@ class Places:
         weld = model.body_weldid[model.geom_bodyid]
         parent = model.body_weldid[model.body_parentid[weld]]
         family = ((parent[one] == weld[other]) & (weld[other] > 0)) | ((parent[other] == weld[one]) & (weld[one] > 0))
-        return bool(np.any(_meet(model, one, other) & (weld[one] != weld[other]) & ~family))
-
-
-def slides_on_what_stands(model: mujoco.MjModel, site: Site) -> str:
-    """Why a body in space cannot slide on anything that stands, with friction; empty: it can, or is another site."""
-    if site.kind != "body":
-        return ""
-    weld = model.body_weldid[model.geom_bodyid]
-    own, stands = weld == model.body_weldid[model.body(site.name).id], weld == 0
-    one, other = model.pair_geom1, model.pair_geom2
-    paired = (own[one] & stands[other]) | (own[other] & stands[one])
-    one, other = np.flatnonzero(own)[:, None], np.flatnonzero(stands)
-    rubs = np.maximum(model.geom_condim[one], model.geom_condim[other]) >= _WITH_FRICTION
-    if np.any(paired & (model.pair_dim >= _WITH_FRICTION)) or np.any(_meet(model, one, other) & rubs):
-        return ""
-    return "it touches nothing that stands with friction"
-
-
-def _meet(model: mujoco.MjModel, one: Ints, other: Ints) -> Bools:
-    """Whether the contact masks of geoms let them touch."""
-    types, answers = model.geom_contype, model.geom_conaffinity
-    return np.asarray(((types[one] & answers[other]) | (types[other] & answers[one])) != 0)
+        return bool(np.any(masks_meet(model, one, other) & (weld[one] != weld[other]) & ~family))
 
 
 def slides_in_plane(model: mujoco.MjModel, body: int) -> bool:

@@ -15,6 +15,7 @@ from compass_ros.discovery import form
 from compass_ros.discovery.fits import without
 from compass_ros.discovery.form import told_apart
 from compass_ros.discovery.hypothesis import Hypothesis, name_of, widened
+from compass_ros.discovery.odds import Known, Prior, Weighed
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, effect
 from compass_ros.simulation.sizes import unit_joint
@@ -45,8 +46,13 @@ def fitted(folder: Path, laws: list[Attached], numbers: list[float], beyond: flo
     return Hypothesis(model.laws, simulator, likelihood, model.fit, without(model, laws).fit.linear.residual)
 
 
+def known(*models: Weighed) -> Known:
+    prior = Prior({"spring": 1, "cogging": 1})
+    return Known(prior, 0.0, {model.name: (model, odds) for model, odds in models}, set())
+
+
 def physics(model: Hypothesis, least: float = -1.0) -> list[str]:
-    ((said, odds),) = told_apart({model.name: (model, 0.0)}, least)
+    ((said, odds),) = told_apart(known((model, 0.0)), least)
     assert odds == 0.0
     assert {*said.physics, *said.corrections} == set(model.laws)
     return [name_of([a]) for a in said.physics]
@@ -80,10 +86,10 @@ def test_models_that_name_the_same_are_one(tmp_path: Path, monkeypatch: pytest.M
     values = [numbers.get(q.name, q.start) for law in laws for q in law.effect.quantities]
     both = fitted(tmp_path, laws, values, 2e-3)
     alone = without(both, laws[1:])
-    models = {both.name: (both, 3.0), alone.name: (alone, 1.0)}
-    ((said, odds),) = told_apart(models, -9.0)
+    models = (both, 3.0), (alone, 1.0)
+    ((said, odds),) = told_apart(known(*models), -9.0)
     assert said.corrections == (laws[1],)
     assert said.laws == both.laws
     assert odds == pytest.approx(np.logaddexp(3.0, 1.0))
     monkeypatch.setattr(form, "RHO", (0.0, 1e-3))  # the number that decides
-    assert [m.name for m, _ in told_apart(models, -9.0)] == [both.name, alone.name]
+    assert [m.name for m, _ in told_apart(known(*models), -9.0)] == [both.name, alone.name]

@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import mujoco
 
+from compass_ros.simulation.contacts import slides_on_what_stands
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity, friction
 from compass_ros.simulation.extents import BodySize
 from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.simulation.sites import Site, slides_on_what_stands
+from compass_ros.simulation.sites import Site
 from compass_ros.types import Floats
 
 

@@ -9,10 +9,10 @@ of its contacts with what stands is larger by extra / (1 + ...), by the place of
 
 from __future__ import annotations
 
+from compass_ros.simulation.contacts import slides_on_what_stands
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity, friction
 from compass_ros.simulation.extents import BodySize
 from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.simulation.sites import slides_on_what_stands
 from compass_ros.types import Floats
 
 

@@ -9,10 +9,11 @@ the slip there; with `extra` below zero it grows with speed.
 
 from __future__ import annotations
 
+from compass_ros.simulation.contacts import slides_on_what_stands
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity, friction
 from compass_ros.simulation.extents import BodySize
 from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.simulation.sites import JOINTS, LYING, slides_on_what_stands
+from compass_ros.simulation.sites import JOINTS, LYING
 from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize
 from compass_ros.types import Floats
 
