@@ -68,7 +68,7 @@ def test_what_corrects_a_form_is_told_and_is_no_explanation(make_result: Callabl
     result = make_result("named")
     first, *others = ranked(result.mismatch)
     assert first.name == "fan_field on puck1"
-    assert first.notes == ["its form is corrected by swirl on puck1: less than laws' forms differ by"]
+    assert first.notes == ["with swirl on puck1 as a correction of its form, as published forms of one law differ"]
     assert not any(row.form for row in others)
     assert first.notes[0].replace("'", "&#39;") in render(result, ReportExtras())
     assert first.notes[0] in " ".join(printed(result, ReportExtras()).split())

@@ -83,7 +83,9 @@ def _row(one: Explanation, first: Explanation, kept: bool) -> Ranked:
 
 def _form(corrections: Sequence[ExplainedLaw]) -> str:
     said = [f"{law.name} on {_sites(law)}" if law.sites else law.name for law in corrections]
-    return f"its form is corrected by {' and '.join(said)}: less than laws' forms differ by" if said else ""
+    return (
+        f"with {' and '.join(said)} as a correction of its form, as published forms of one law differ" if said else ""
+    )
 
 
 def _sites(law: ExplainedLaw) -> str:
