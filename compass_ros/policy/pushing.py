@@ -9,6 +9,7 @@ import numpy as np
 from numpy.random import Generator
 
 from compass_ros.errors import ConfigError
+from compass_ros.policy.augmented import POSE, Augmented, yaw
 from compass_ros.policy.belief import Belief
 from compass_ros.policy.sac import Policy, Settings, learn
 from compass_ros.types import Bools, Floats, Report, silent
@@ -69,14 +70,16 @@ class Simulated:
     def step(self, velocity: Floats) -> tuple[Floats, Floats]:
         steps = round(CONTROL_S / self._simulator.time_step)
         told = np.repeat(velocity[:, None], steps, axis=1)
-        self._state = self._simulator.play(self._values, self._state, told, steps)[0][:, -1]
+        before = self._state
+        self._state = self._simulator.play(self._values, before, told, steps)[0][:, -1]
+        if isinstance(self._belief, Augmented):
+            self._state = self._belief.corrected(before, velocity, self._state)
         return self._seen()
 
     def _seen(self) -> tuple[Floats, Floats]:
-        place = self._state[:, 1:10]  # tool x, y; bar x, y, z and quaternion
-        yaw = 2 * np.arctan2(place[:, 8], place[:, 5])
-        bar = np.concatenate([place[:, 2:4] + self._bias, yaw[:, None]], axis=1)
-        return bar, place[:, :2] + [_TOOL_X, 0.0]
+        place = self._state[:, POSE][:, :2] + self._bias
+        bar = np.concatenate([place, yaw(self._state)[:, None]], axis=1)
+        return bar, self._state[:, 1:3] + [_TOOL_X, 0.0]
 
 
 _TOOL_X = -0.036

@@ -15,7 +15,8 @@ from compass_ros.calibration.problem import Allowance
 from compass_ros.config import CalibrationConfig
 from compass_ros.errors import ConfigError, nearest
 from compass_ros.pipeline import calibrate
-from compass_ros.policy import Belief, Case, belief, one
+from compass_ros.policy import Belief, Case, belief, one, pushing
+from compass_ros.policy.augmented import augmented
 from compass_ros.policy.residual import Residual
 from compass_ros.posing import pose
 from compass_ros.results import write_all
@@ -124,6 +125,8 @@ class Makers:
 
     def _with_residual(self, base: Belief) -> Belief:
         data = recordings(self.experiment.cell, self.episodes)
+        if self.experiment.over_time is not None:
+            return augmented(base, data, pushing.CONTROL_S, self.seed)
         said = base.observe(data.inputs, data.steps_s, np.random.default_rng(0))
         return replace(base, correction=Residual(data.inputs, data.steps_s, said, data.at_steps, self.seed))
 

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
 
 from compass_ros.cells import load
 from compass_ros.errors import ConfigError
-from compass_ros.policy import belief, one
-from compass_ros.policy.residual import Residual
+from compass_ros.policy import Belief, belief, one
+from compass_ros.policy.augmented import augmented
+from compass_ros.policy.residual import Ensemble, Residual
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, effect
 from compass_ros.simulation.extents import unit_body
+from compass_ros.simulation.replay import Recordings
 from compass_ros.transfer import campaign, table
 from compass_ros.transfer.experiment import air_hockey, push_i
 from compass_ros.transfer.loop import LoopConfig, run_loop
@@ -56,6 +60,31 @@ def test_a_policy_over_time_is_trained_played_and_kept(tmp_path: Path) -> None:
     }
     assert (tmp_path / "policy-nominal-0.npz").is_file()
     assert 0 <= float(str(rows[0]["success"])) <= 1
+
+
+def test_a_network_of_control_steps_learns_how_a_bar_turns() -> None:
+    task = push_i()
+    cell, simulator = task.cell, Simulator(task.cell, threads=1, options={"timestep": 0.001})
+    true = cell.defaults.copy()
+    true[cell.index("bar@dyna@centre_y")] += 0.002
+    rng, time_s = np.random.default_rng(0), np.tile(np.arange(96) / 60, (12, 1))
+    inputs = simulator.inputs(task.commands(12, 0))
+    truth = simulator.observe(np.tile(true, (12, 1)), inputs, time_s)
+    seen = truth + 1e-4 * rng.standard_normal(truth.shape)
+    seen[3, 40:43] = np.nan
+    steps_s = cell.control_dt * np.arange(cell.horizon + 1)
+    data = Recordings((), inputs, time_s, seen, steps_s, np.empty(0), np.empty(0), np.empty(0))
+    plain = one(simulator, cell.defaults)
+    networked = augmented(plain, data, cell.control_dt, 0)
+    other, at = task.commands(12, 7), steps_s[:-1]
+    real = simulator.observe(np.tile(true, (12, 1)), simulator.inputs(other), np.tile(at, (12, 1)))
+
+    def missed(belief: Belief) -> float:
+        return float(np.linalg.norm(belief.observe(other, at, rng)[..., :2] - real[..., :2]))
+
+    assert missed(networked) < 0.6 * missed(plain)
+    still = replace(networked, left=cast(Ensemble, lambda features: np.zeros((len(features), 3))))
+    np.testing.assert_allclose(still.observe(other, at, rng), plain.observe(other, at, rng), atol=1e-9)
 
 
 def test_a_belief_is_kept_with_its_laws_and_its_shares(tmp_path: Path) -> None:
