@@ -524,7 +524,10 @@ PICTURES: dict[str, Picture] = {
     "actuation_delay": Picture(command([0.15], steps), "all of the command, later"),
     "first_order_lag": Picture(command([0.15], steps), "corners of the command are rounded"),
     "velocity_saturation": Picture(command([1.6, 8.0], swing, "speed"), "fast commands are cut off, slow ones are not"),
-    "dead_band": Picture(command([0.25], swing, "speed"), "too slow by a fixed amount; small commands do nothing"),
+    "dead_band": Picture(
+        command([0.25], swing, "speed"),
+        "too slow by a fixed amount; small commands do nothing; a servo stops short of its target and stays there",
+    ),
     "heading_bias": Picture(heading, "every push is turned by the same angle"),
     "stroke_jitter": Picture(jitter, "the same command comes out differently each time"),
     "torque_saturation": Picture(
@@ -533,7 +536,6 @@ PICTURES: dict[str, Picture] = {
     "rate_limit": Picture(command([0.35], steps), "steps become ramps"),
     "gain_error": Picture(command([-0.2], swing), "every command is too small or too large by the same share"),
     "hysteresis": Picture(command([0.5], swing), "flat tops, and lost motion at each reversal"),
-    "servo_dead_band": Picture(servo([0.08], ("servo",)), "stops short of its target and stays there"),
     "camera_latency": Picture(moving([0.03]), "wrong by speed times a delay; right at rest"),
     "camera_scale": Picture(camera([-0.08, 0.0, 0.0]), "every distance is too short or too long by the same share"),
     "camera_rotation": Picture(camera([0.08, 0.0, 0.0]), "the picture is turned about the camera's axis"),

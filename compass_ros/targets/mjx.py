@@ -62,9 +62,9 @@ def write_mjx(scene: Path, exported: Exported, out: Path) -> tuple[Said, ...]:
 def _of(fitted: FittedEffect, places: Places, exported: Exported, changed: mujoco.MjModel) -> tuple[list[Term], Said]:
     """Terms of one law, or its change of the model; and what became of it."""
     law, on = fitted.attached.effect, fitted.attached.objects
+    outside = "acts on commands" if law.controls is not None else "acts on what a sensor says"
     if law.forces is None and law.model is None:
-        what = "acts on commands" if law.controls is not None else "acts on what a sensor says"
-        return [], Said(law.name, on, "left out", f"{what}, outside of the model")
+        return [], Said(law.name, on, "left out", f"{outside}, outside of the model")
     if law.rotor or (rotors(changed) and law.model is not None):
         return [], Said(law.name, on, "left out", "a motor's joint of its own, not tried in MJX")
     context = context_in(places, exported, fitted)
@@ -72,8 +72,9 @@ def _of(fitted: FittedEffect, places: Places, exported: Exported, changed: mujoc
         law.model(changed, np.array(fitted.values), context)
         return [], Said(law.name, on, "exact", "by `prepare`")
     terms = list(law.forces(np.array([fitted.values]), context)) if law.forces is not None else []
-    if unsaid := [why for term in terms if (why := _unsaid(term))]:
-        return [], Said(law.name, on, "left out", unsaid[0])
+    unsaid = [why for term in terms if (why := _unsaid(term))]
+    if unsaid or not terms:
+        return [], Said(law.name, on, "left out", (unsaid or [f"{outside}, outside of the model"])[0])
     if any(term.kind in _DRY and term.site is not None and term.site.kind in JOINTS for term in terms):
         return terms, Said(law.name, on, "alike", "whole from the speed that it stops in a step; what it holds creeps")
     return terms, Said(law.name, on, "exact")

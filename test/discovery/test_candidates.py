@@ -94,7 +94,7 @@ def test_laws_on_drives_are_asked_of_all_of_a_kind_and_of_each(
         "actuation_delay": "pveo",
         "first_order_lag": "pveo",
         "velocity_saturation": "v",
-        "dead_band": "ve",
+        "dead_band": "pve",
     }.items():
         own = [i for i, kind in enumerate(kinds) if kind in able]
         expected = set()

@@ -20,7 +20,7 @@ from compass_ros.cells.dynamics import Sliding
 from compass_ros.simulation.effects import Attached, Exported, FittedEffect, attach, effect
 from compass_ros.simulation.extents import unit_body
 from compass_ros.simulation.native.program import Kind
-from compass_ros.simulation.sizes import unit_joint
+from compass_ros.simulation.sizes import DriveSize, unit_joint
 from compass_ros.targets.mjx import SOURCE, write_mjx
 from compass_ros.types import Floats
 
@@ -80,6 +80,8 @@ def fitted(name: str, on: tuple[str, ...], values: tuple[float, ...]) -> FittedE
         law = law.at(unit_joint("hinge"))
     if law.on_body is not None and on[0] in ("one", "two", "upper", "lower"):
         law = law.at(unit_body())
+    if law.on_drive is not None and on == ("servo",):
+        law = law.at(DriveSize("position_drive", 1.0, "rad"))
     return FittedEffect(Attached(law, on), values, tuple(np.nan for _ in values))
 
 
@@ -99,7 +101,7 @@ def scene(tmp_path: Path) -> Callable[[str], Path]:
 
 
 def test_what_mjx_has_no_place_for_is_left_out_and_said(scene: Callable[[str], Path], tmp_path: Path) -> None:
-    laws = exported((("gain_error", ("motor",), (0.1,)), ("servo_dead_band", ("servo",), (0.01,))))
+    laws = exported((("gain_error", ("motor",), (0.1,)), ("dead_band", ("servo",), (0.01, 0.0))))
     said = write_mjx(scene(ARM), laws, tmp_path / "laws_mjx.py")
     assert [one.fate for one in said] == ["left out", "left out"]
     assert "outside of the model" in said[0].line()

@@ -11,7 +11,7 @@ import numpy as np
 
 from compass_ros.cells.derived import set_const
 from compass_ros.errors import ConfigError
-from compass_ros.simulation.effects.effect import Context, restore, table_friction
+from compass_ros.simulation.effects.effect import Context, Effect, restore, table_friction
 from compass_ros.simulation.effects.exported import Exported, FittedEffect
 from compass_ros.simulation.native.program import Programs, Term
 from compass_ros.simulation.rotors import carry
@@ -63,15 +63,22 @@ def attach(model: mujoco.MjModel, data: mujoco.MjData, exported: Exported) -> At
 def _terms(places: Places, exported: Exported, acting: Sequence[tuple[FittedEffect, Context]]) -> list[Term]:
     terms = [table_friction(s, places) for s in exported.sliding.values()]
     for fitted, context in acting:
-        if fitted.attached.effect.forces is not None:
-            terms.extend(fitted.attached.effect.forces(np.array([fitted.values]), context))
+        kind = fitted.attached.effect
+        own = kind.forces(np.array([fitted.values]), context) if kind.forces is not None else ()
+        if kind.model is None and not own:
+            raise _outside(kind)
+        terms.extend(own)
     return terms
+
+
+def _outside(kind: Effect) -> ConfigError:
+    return ConfigError(f"effect '{kind.name}' belongs to the {kind.channel}, outside the model; apply it there")
 
 
 def _context(places: Places, exported: Exported, fitted: FittedEffect) -> Context:
     kind = fitted.attached.effect
     if kind.model is None and kind.forces is None:
-        raise ConfigError(f"effect '{kind.name}' belongs to the {kind.channel}, outside the model; apply it there")
+        raise _outside(kind)
     return context_in(places, exported, fitted)
 
 

@@ -18,7 +18,7 @@ _NAMES = (
     *("rate_dependent_restitution", "tangential_impulse", "local_wall", "off_centre_mass", "friction_cone"),
     *("adhesion", "rolling_resistance"),
     *("actuation_delay", "first_order_lag", "velocity_saturation", "dead_band", "heading_bias", "stroke_jitter"),
-    *("torque_saturation", "rate_limit", "gain_error", "hysteresis", "servo_dead_band"),
+    *("torque_saturation", "rate_limit", "gain_error", "hysteresis"),
     *("camera_latency", "camera_scale", "camera_rotation", "lens_distortion", "rolling_shutter", "tracking_lag"),
     *("clock_drift", "latency", "scale", "offset", "rotation", "eccentricity"),
     "parameter",

@@ -2,8 +2,8 @@
 
 static double within(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
 
-// A position servo that does nothing while its error is within a band, and beyond it answers what is more: what it exerts
-// then less what MuJoCo lets it exert. p: half of the band, in units of the command.
+// A position servo that does nothing while its error is within a band, and beyond it answers what is more, or with a share
+// of the band at once: what it exerts then less what MuJoCo lets it exert. p: half of the band in units of the command, share.
 static void servo_dead_band(const mjModel* m, mjData* d, const Term* term) {
   int i = term->id;
   const mjtNum *gain = m->actuator_gainprm + i * mjNGAIN, *bias = m->actuator_biasprm + i * mjNBIAS;
@@ -13,7 +13,8 @@ static void servo_dead_band(const mjModel* m, mjData* d, const Term* term) {
   if (m->actuator_actnum[i]) told = d->act[m->actuator_actadr[i] + m->actuator_actnum[i] - 1];
   double error = told + (bias[0] + bias[1] * d->actuator_length[i]) / gain[0];
   double force = gain[0] * error + bias[2] * d->actuator_velocity[i];
-  double less = force - gain[0] * within(error, -term->number[0], term->number[0]);
+  double band = term->number[0], missed = within(error, -band, band);
+  double less = force - gain[0] * (missed == error ? missed : (1 - term->number[1]) * missed);
   if (m->actuator_forcelimited[i]) {
     const mjtNum* range = m->actuator_forcerange + 2 * i;
     force = within(force, range[0], range[1]);

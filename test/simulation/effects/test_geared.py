@@ -8,8 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from compass_ros.errors import ConfigError
 from compass_ros.simulation.effects import Attached, Exported, FittedEffect, attach, effect
 from compass_ros.simulation.effects.effect import Context
+from compass_ros.simulation.sizes import DriveSize
 from compass_ros.types import Floats
 from test.simulation.effects.scenes import flown
 
@@ -214,8 +216,15 @@ def test_a_drive_pushes_no_harder_than_its_limit(actuator: str, told: float) -> 
     assert rate == pytest.approx(np.sign(told) * 0.1 * limit / INERTIA, rel=1e-3)
 
 
+def servo(*numbers: float) -> Exported:
+    """A dead band of a position servo."""
+    law = effect("dead_band").at(DriveSize("position_drive", 1.0, "rad"))
+    return Exported((FittedEffect(Attached(law, ("a",)), numbers, ()),), {})
+
+
+@pytest.mark.parametrize("punch", [0.0, 0.6])
 @pytest.mark.parametrize("extra", ["", 'ctrlrange="-.5 .5"', 'forcerange="-.3 .3"', 'timeconst=".02"', 'gear="2"'])
-def test_a_servo_with_a_dead_band_is_what_its_formula_says(extra: str) -> None:
+def test_a_servo_with_a_dead_band_is_what_its_formula_says(extra: str, punch: float) -> None:
     """Against the formula integrated, with every option that a servo has in MuJoCo."""
     told, band = 0.8, 0.15
     gear, told_most, limit = (
@@ -227,18 +236,26 @@ def test_a_servo_with_a_dead_band_is_what_its_formula_says(extra: str) -> None:
     def formula(t: float, q: Floats, v: Floats) -> Floats:
         command = told * (1 - np.exp(-t / 0.02)) if "time" in extra else min(told, told_most)
         error = command - gear * q
-        force = 4 * (error - np.clip(error, -band, band)) - 0.3 * gear * v
+        kept = 1 - punch if abs(error) > band else 1
+        force = 4 * (error - kept * np.clip(error, -band, band)) - 0.3 * gear * v
         return np.asarray(gear * np.clip(force, -limit, limit) / INERTIA)
 
     model = axis(f'<position name="a" joint="axis" kp="4" kv=".3" {extra}/>')
-    found = moved(model, laws(("servo_dead_band", (band,), "a")), (0.1, 0.0), 0.4, told)
+    found = moved(model, servo(band, punch), (0.1, 0.0), 0.4, told)
     np.testing.assert_allclose(found, flown(formula, np.array([0.1]), np.zeros(1), 0.4, 600), rtol=3e-3, atol=1e-3)
 
 
 def test_within_its_dead_band_a_servo_does_nothing() -> None:
     model = axis('<position name="a" joint="axis" kp="4"/>')
-    assert moved(model, laws(("servo_dead_band", (0.2,), "a")), (0.1, 0.0), 0.5, 0.25)[1] == pytest.approx(0, abs=1e-12)
-    assert abs(moved(model, laws(("servo_dead_band", (0.2,), "a")), (0.1, 0.0), 0.5, 0.35)[1]) > 0.1
+    for punch in (0.0, 1.0):
+        assert moved(model, servo(0.2, punch), (0.1, 0.0), 0.5, 0.25)[1] == pytest.approx(0, abs=1e-12)
+    assert abs(moved(model, servo(0.2, 0.0), (0.1, 0.0), 0.5, 0.35)[1]) > 0.1
+
+
+def test_a_dead_band_of_what_is_told_a_force_is_outside_of_the_model() -> None:
+    model = axis('<motor name="a" joint="axis"/>')
+    with pytest.raises(ConfigError, match="'dead_band' belongs to the actuation, outside"):
+        moved(model, laws(("dead_band", (0.1,), "a")), (0.0, 0.0), 0.1, 0.5)
 
 
 Shape = Callable[[Floats], Floats]

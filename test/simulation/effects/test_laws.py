@@ -146,7 +146,7 @@ def test_sizes_are_those_of_the_scene_in_its_own_units(
         ("tether", ("post", "world"), "neither moves against the other"),
         ("adhesion", ("ball", "flor"), "the scene has no geom 'flor'.*did you mean 'floor'"),
         ("rolling_resistance", (), "acts between two geoms, found none"),
-        ("servo_dead_band", ("motor",), "the scene has no position drive 'motor'"),
+        ("dead_band", ("shoulder",), "the scene has no .*drive.* 'shoulder'"),
         ("rate_limit", ("shoulder",), "no drive of one actuator 'shoulder'"),
         ("scale", (), "acts on at least one object, found none"),
         ("offset", ("ball",), "no measured joint or other sensor 'ball'"),

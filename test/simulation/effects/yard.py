@@ -47,7 +47,7 @@ NEW: dict[str, tuple[str, ...]] = {
     "rate_limit": ("servo",),
     "gain_error": ("motor",),
     "hysteresis": ("servo",),
-    "servo_dead_band": ("servo",),
+    "dead_band": ("servo",),
     "scale": ("elbow",),
     "offset": ("shoulder",),
     "rotation": ("ball",),
