@@ -251,8 +251,10 @@ def _evaluate(term: Term, s: _State) -> tuple[Any, Any, Any]:  # noqa: PLR0911, 
             away, turn, soft = s.x - p[1], p[2] * (s.x - p[1]), jnp.where(p[2] == 0, 1.0, p[2])
             pull = jnp.where(p[2] > 0, jnp.sin(turn) / soft, jnp.where(p[2] < 0, jnp.sinh(turn) / soft, away))
             return -p[0] * pull, 0.0, 0.0
-        case "cogging":  # cosine and sine amplitude, periods per turn
-            return p[0] * jnp.cos(p[2] * s.x) + p[1] * jnp.sin(p[2] * s.x), 0.0, 0.0
+        case "cogging":  # cosine and sine amplitude, periods per turn, amplitudes of the second harmonic
+            first, second = p[2] * s.x, 2 * p[2] * s.x
+            once = p[0] * jnp.cos(first) + p[1] * jnp.sin(first)
+            return once + p[3] * jnp.cos(second) + p[4] * jnp.sin(second), 0.0, 0.0
         case "gravity_tilt":  # two angles
             x, y, z = s.mass * _tilted(s.gravity, p[0], p[1])
             return x, y, z

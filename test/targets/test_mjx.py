@@ -40,7 +40,7 @@ SMOOTH: tuple[tuple[str, tuple[str, ...], tuple[float, ...]], ...] = (
     ("quadratic_drag", ("elbow",), (0.1,)),
     ("spring", ("elbow",), (1.5, 0.2, 0.7)),
     ("spring", ("shoulder",), (0.5, -0.2, -0.4)),
-    ("cogging", ("shoulder",), (0.2, -0.1, 6.0)),
+    ("cogging", ("shoulder",), (0.2, -0.1, 6.0, 0.05, 0.1)),
     ("gravity_tilt", ("upper", "lower"), (0.05, -0.03)),
     ("payload", ("lower",), (0.4, 0.008, 0.004, -0.04)),
 )

@@ -233,8 +233,10 @@ static Force evaluate(const Term* term, const State* s) {
       return (s->way ? s->way : s->vx) > 0 ? along(s, p[0], 0) : (Force){0, 0, 0};
     case LOAD_FRICTION:    // p: friction as a share of the load
       return along(s, p[0] * fabs(s->load), 0);
-    case COGGING:          // p: cosine and sine amplitude, periods per turn
-      return (Force){p[0] * cos(p[2] * s->x) + p[1] * sin(p[2] * s->x), 0, 0};
+    case COGGING: {        // p: cosine and sine amplitude, periods per turn, amplitudes of the second harmonic
+      double c = cos(p[2] * s->x), z = sin(p[2] * s->x);
+      return (Force){p[0] * c + p[1] * z + p[3] * (2 * c * c - 1) + p[4] * 2 * z * c, 0, 0};
+    }
     case GRAVITY_TILT: {   // p: two angles
       Force f = tilted(s->gravity, p[0], p[1]);
       return (Force){s->mass * f.x, s->mass * f.y, s->mass * f.z};

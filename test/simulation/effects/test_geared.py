@@ -191,11 +191,13 @@ def test_friction_by_load_knows_the_load_of_this_very_moment() -> None:
 @pytest.mark.parametrize("periods", [1.0, 4.0, 7.5, 24.0, 60.0])
 def test_cogging_repeats_with_the_angle(periods: float) -> None:
     def formula(t: float, q: Floats, v: Floats) -> Floats:
-        return np.asarray((0.3 * np.cos(periods * q) - 0.2 * np.sin(periods * q)) / INERTIA)
+        once = 0.3 * np.cos(periods * q) - 0.2 * np.sin(periods * q)
+        return np.asarray((once + 0.1 * np.cos(2 * periods * q) + 0.15 * np.sin(2 * periods * q)) / INERTIA)
 
-    found = moved(axis(), laws(("cogging", (0.3, -0.2, periods), "axis")), (0.2, 5.0), 0.5)
+    numbers = (0.3, -0.2, periods, 0.1, 0.15)
+    found = moved(axis(), laws(("cogging", numbers, "axis")), (0.2, 5.0), 0.5)
     np.testing.assert_allclose(found, flown(formula, np.array([0.2]), np.array([5.0]), 0.5, 600), rtol=1e-3)
-    turned = moved(axis(), laws(("cogging", (0.3, -0.2, periods), "axis")), (0.2 + 2 * np.pi / periods, 5.0), 0.5)
+    turned = moved(axis(), laws(("cogging", numbers, "axis")), (0.2 + 2 * np.pi / periods, 5.0), 0.5)
     np.testing.assert_allclose(turned - found, [2 * np.pi / periods, 0], atol=1e-5)
 
 
