@@ -102,18 +102,21 @@ def wrong_number(attached: Attached, deviation: float, places: Places) -> str:
 def value_of(finding: EffectFinding, attached: Attached, told: bool) -> str:
     """The effect and its amplitudes: 'fan_field, strength 0.21 +- 0.01 m/s^2'; `told`: with what it acts on.
 
-    A law that is clearly there and has wide error bars is known together with its shape, or with numbers of the scene.
+    Those that are not told from zero stand last. A law that is clearly there and of which that holds for all is known
+    together with its shape, or with numbers of the scene.
     """
-    numbers, wide = [], True
+    sure, open_ = list[str](), list[str]()
     for quantity in attached.effect.quantities:
         if quantity.amplitude:
             found = finding.parameters[quantity.name]
-            wide = wide and abs(found.value) < ERROR_BARS * found.std
             unit = "" if found.unit == "1" else f" {found.unit}"
-            numbers.append(f"{quantity.name} {found.value:.3g} +- {found.std:.1g}{unit}")
-    together = " (shows only together with other numbers)" if wide else ""
+            to = sure if abs(found.value) >= ERROR_BARS * found.std else open_
+            to.append(f"{quantity.name} {found.value:.3g} +- {found.std:.1g}{unit}")
     on = f" of {', '.join(attached.objects)}" if told else ""
-    return f"{finding.name}{on}, {', '.join(numbers)}{together}"
+    if not sure:
+        return f"{finding.name}{on}, {', '.join(open_)} (shows only together with other numbers)"
+    rest = f" (not told from 0: {', '.join(open_)})" if open_ else ""
+    return f"{finding.name}{on}, {', '.join(sure)}{rest}"
 
 
 def corrected(laws: Sequence[Attached]) -> str:

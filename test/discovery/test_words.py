@@ -23,6 +23,18 @@ def test_every_amplitude_and_no_shape_is_said() -> None:
     assert words == "swirl, strength 0.25 +- 0.01 m/s^2"
 
 
+def test_what_is_not_told_from_zero_stands_last() -> None:
+    numbers = {"mass": EffectParameter(0.0, 0.5, "kg")}
+    numbers |= {f"moment_{axis}": EffectParameter(-4e-3, 1e-5, "kg m") for axis in "xyz"}
+    load = EffectFinding("payload", numbers, Evidence(0.9, 100.0, 0.001), ())
+    moments = ", ".join(f"moment_{axis} -0.004 +- 1e-05 kg m" for axis in "xyz")
+    said = value_of(load, Attached(EFFECTS["payload"], ("tool",)), told=False)
+    assert said == f"payload, {moments} (not told from 0: mass 0 +- 0.5 kg)"
+    wide = {name: EffectParameter(one.value, 1.0, one.unit) for name, one in numbers.items()}
+    open_ = EffectFinding("payload", wide, Evidence(0.9, 100.0, 0.001), ())
+    assert value_of(open_, Attached(EFFECTS["payload"], ("tool",)), told=False).endswith("with other numbers)")
+
+
 def test_a_field_on_one_of_two_pucks_has_a_place() -> None:
     fan = Attached(EFFECTS["fan_field"], ("puck1",))
     given = {"strength": 0.2, "centre_x": 0.02, "centre_y": -0.01, "radius": 0.12}

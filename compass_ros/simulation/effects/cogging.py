@@ -1,8 +1,8 @@
 """A torque that repeats with the angle, as between the magnets and teeth of a motor or from the teeth of a gear.
 
-F = cosine cos(periods q) + sine sin(periods q) + cosine_2 cos(2 periods q) + sine_2 sin(2 periods q), a torque; `periods`
-per turn. Source: the first two harmonics of the cogging torque (Hanselman 2003, ch. 5); behind a gear `periods` need be
-no whole number.
+F = cosine cos(periods q) + sine sin(periods q) + cosine_2 cos(2 periods q) + sine_2 sin(2 periods q), a torque;
+`periods` per turn. Source: the first two harmonics of the cogging torque (Hanselman 2003, ch. 5); behind a gear
+`periods` need be no whole number.
 """
 
 from __future__ import annotations
