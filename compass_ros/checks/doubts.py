@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
+from scipy.stats import pearsonr
 
 from compass_ros.cells import Cell
 from compass_ros.cells.scene_source import missing_meshes
-from compass_ros.types import Episode, Track
+from compass_ros.types import Episode, Floats, Track
 
 FEW = 8
 """Fewer episodes than this leave little to hold out."""
@@ -16,12 +18,18 @@ _STILL = 6.0
 """An object that stays within so many standard deviations of its median, as the sensor states them, has not moved."""
 _EXPECTED = 2.0
 """The least such distance, in the noise that the cell expects."""
+_COMMON = 0.5
+"""Correlation of two objects' scatter from which most of it is common to both: common over all variance."""
+_CHANCE = 1e-4
+"""Probability of a correlation as high by chance, at most."""
 
 
 def doubts(cell: Cell, episodes: Sequence[Episode]) -> tuple[str, ...]:
     """One sentence each; empty when nothing is odd."""
     said = [_few(episodes), _alike(episodes)]
     said += [_unmoved(spec.name, episodes, cell.spec.noise_m) for spec in cell.objects]
+    places = [spec.name for spec in cell.objects if spec.quantity in ("xy", "xyz", "pose")]
+    said.append(_shaking(places, episodes))
     said += [missing_meshes(cell.model_path), *_remarks(episodes)]
     return tuple(filter(None, said))
 
@@ -64,6 +72,31 @@ def _unmoved(name: str, episodes: Sequence[Episode], expected: float) -> str:
     if not tracks or any(_moves(track, expected) for track in tracks):
         return ""
     return f"{name} never moves in {len(episodes)} episodes: nothing can be said about its parameters"
+
+
+def _shaking(names: Sequence[str], episodes: Sequence[Episode]) -> str:
+    """What is seen of several objects at one moment, one camera sees: where they jitter together at rest, it moves."""
+    for one, other in combinations(names, 2):
+        rests = [_at_rest(episode, one, other) for episode in episodes]
+        of_one, of_other = (np.concatenate([rest[i].ravel() for rest in rests]) for i in (0, 1))
+        if len(of_one) < FEW or not of_one.any() or not of_other.any():
+            continue
+        common = pearsonr(of_one, of_other, alternative="greater")
+        if common.statistic > _COMMON and common.pvalue < _CHANCE:
+            size = 1e3 * float(np.sqrt(common.statistic) * np.sqrt(of_one.std() * of_other.std()))
+            how = f"correlation {common.statistic:.2f}, {size:.2g} mm"
+            return f"{one} and {other} jitter together while they rest ({how}): their camera or its mount moves"
+    return ""
+
+
+def _at_rest(episode: Episode, *names: str) -> list[Floats]:
+    """(n, 2) of each object: x and y at the stamps before the command at which all were seen, less their means."""
+    tracks = [track for name in names for track in episode.tracks if track.object == name]
+    stamps = set.intersection(*(set(t.stamp_ns[t.stamp_ns < episode.start_ns].tolist()) for t in tracks))
+    if len(tracks) < len(names) or not stamps:
+        return [np.zeros((0, 2)) for _ in names]
+    seen = [track.value[np.isin(track.stamp_ns, sorted(stamps)), :2] for track in tracks]
+    return [place - place.mean(axis=0) for place in seen]
 
 
 def _moves(track: Track, expected: float) -> bool:

@@ -10,7 +10,7 @@ import pytest
 from compass_ros.cells import Cell, load
 from compass_ros.checks.doubts import doubts
 from compass_ros.operation.current import read
-from compass_ros.types import Episode
+from compass_ros.types import Episode, Track
 from test.nodes.recordings import record
 
 
@@ -45,6 +45,29 @@ def test_sound_recordings_raise_none(cell: Cell, sound: list[Episode]) -> None:
 def test_a_puck_that_never_moves(cell: Cell, sound: list[Episode]) -> None:
     (said,) = doubts(cell, [still(episode, "puck2", 3e-4) for episode in sound])
     assert said == "puck2 never moves in 8 episodes: nothing can be said about its parameters"
+
+
+def test_a_camera_that_shakes(cell: Cell, sound: list[Episode]) -> None:
+    """3 mm at 9 Hz moves both pucks; a scatter of each alone does not."""
+    rng = np.random.default_rng(0)
+
+    def shaken(episode: Episode, common: float, own: float) -> Episode:
+        phase = rng.uniform(0, 2 * np.pi, 2)
+
+        def moved(track: Track) -> Track:
+            before = episode.start_ns - 16_666_667 * np.arange(15, 0, -1)
+            stamp = np.concatenate([before, track.stamp_ns])
+            value = np.concatenate([np.repeat(track.value[:1], 15, axis=0), track.value])
+            time = (stamp - episode.start_ns) * 1e-9
+            value[:, :2] += common * np.sin(2 * np.pi * 9 * time[:, None] + phase) + rng.normal(0, own, (len(time), 2))
+            return replace(track, stamp_ns=stamp, value=value, std=None)
+
+        return replace(episode, tracks=tuple(moved(track) for track in episode.tracks))
+
+    (said,) = doubts(cell, [shaken(episode, 3e-3, 3e-4) for episode in sound])
+    assert said.startswith("puck1 and puck2 jitter together while they rest (correlation 0.9")
+    assert said.endswith(" mm): their camera or its mount moves")
+    assert doubts(cell, [shaken(episode, 0.0, 3e-3) for episode in sound]) == ()
 
 
 def test_copies(cell: Cell, sound: list[Episode]) -> None:
