@@ -131,8 +131,9 @@ def table(rows: Sequence[Row]) -> str:
             out.append(f"{about} none of its class is asked | {row['plain']} | - | - | - |")
             continue
         over = float(str(row["log_evidence"])) - float(str(row["unknown"]))
-        share = 100 * float(str(row["left_over"]))
-        out.append(f"{about} `{row['law']}` | {row['plain']} | {row['with_law']} | {share:.1f} % | {over:.0f} |")
+        left = 100 * float(str(row["left_over"]))
+        share = f"{left:.1f} %" if left <= 100 else "> 100 %"
+        out.append(f"{about} `{row['law']}` | {row['plain']} | {row['with_law']} | {share} | {over:.0f} |")
     return "\n".join(out)
 
 
