@@ -77,9 +77,9 @@ def _unmoved(name: str, episodes: Sequence[Episode], expected: float) -> str:
 def _shaking(names: Sequence[str], episodes: Sequence[Episode]) -> str:
     """What is seen of several objects at one moment, one camera sees: where they jitter together at rest, it moves."""
     for one, other in combinations(names, 2):
-        rests = [_at_rest(episode, one, other) for episode in episodes]
-        of_one, of_other = (np.concatenate([rest[i].ravel() for rest in rests]) for i in (0, 1))
-        if len(of_one) < FEW or not of_one.any() or not of_other.any():
+        scatter = [_at_rest(episode, one, other) for episode in episodes]
+        of_one, of_other = np.concatenate([np.zeros((2, 0)), *scatter], axis=1)
+        if not of_one.any() or not of_other.any():
             continue
         common = pearsonr(of_one, of_other, alternative="greater")
         if common.statistic > _COMMON and common.pvalue < _CHANCE:
@@ -89,14 +89,20 @@ def _shaking(names: Sequence[str], episodes: Sequence[Episode]) -> str:
     return ""
 
 
-def _at_rest(episode: Episode, *names: str) -> list[Floats]:
-    """(n, 2) of each object: x and y at the stamps before the command at which all were seen, less their means."""
-    tracks = [track for name in names for track in episode.tracks if track.object == name]
-    stamps = set.intersection(*(set(t.stamp_ns[t.stamp_ns < episode.start_ns].tolist()) for t in tracks))
-    if len(tracks) < len(names) or not stamps:
-        return [np.zeros((0, 2)) for _ in names]
-    seen = [track.value[np.isin(track.stamp_ns, sorted(stamps)), :2] for track in tracks]
-    return [place - place.mean(axis=0) for place in seen]
+def _at_rest(episode: Episode, one: str, other: str) -> Floats:
+    """(2, 2 n) of each object: x and y at n stamps before the command at which both were seen, less their medians.
+
+    Medians, for what never changes is then zero to the last bit.
+    """
+    tracks = [track for name in (one, other) for track in episode.tracks if track.object == name]
+    if len(tracks) < 2:
+        return np.zeros((2, 0))
+    before = [track.stamp_ns[track.stamp_ns < episode.start_ns] for track in tracks]
+    both = np.intersect1d(before[0], before[1])
+    if not len(both):
+        return np.zeros((2, 0))
+    seen = [track.value[np.isin(track.stamp_ns, both), :2] for track in tracks]
+    return np.stack([(place - np.median(place, axis=0)).ravel() for place in seen])
 
 
 def _moves(track: Track, expected: float) -> bool:

@@ -68,6 +68,11 @@ def test_a_camera_that_shakes(cell: Cell, sound: list[Episode]) -> None:
     assert said.startswith("puck1 and puck2 jitter together while they rest (correlation 0.9")
     assert said.endswith(" mm): their camera or its mount moves")
     assert doubts(cell, [shaken(episode, 0.0, 3e-3) for episode in sound]) == ()
+    assert doubts(cell, [shaken(episode, 0.0, 0.0) for episode in sound]) == ()
+    unseen = [replace(shaken(episode, 3e-3, 3e-4), tracks=()) for episode in sound[:2]]
+    alone = [replace(e, tracks=e.tracks[:1]) for e in (shaken(episode, 3e-3, 3e-4) for episode in sound[2:])]
+    assert not any("jitter" in said for said in doubts(cell, [*unseen, *alone]))
+    assert not any("jitter" in said for said in doubts(cell, []))
 
 
 def test_copies(cell: Cell, sound: list[Episode]) -> None:
