@@ -419,12 +419,24 @@ static void solve_small(int n, double* a, double* x) {
   }
 }
 
+// Adds a joint's own frictionloss to the limits of its friction, and leaves none to MuJoCo's constraint; whether it had any.
+static int take_frictionloss(mjData* d, int dof, double* low, double* high) {
+  for (int row = d->ne; row < d->ne + d->nf; row++) {
+    if (d->efc_type[row] != mjCNSTR_FRICTION_DOF || d->efc_id[row] != dof) continue;
+    *low -= d->efc_frictionloss[row], *high += d->efc_frictionloss[row];
+    d->efc_frictionloss[row] = 0;
+    return 1;
+  }
+  return 0;
+}
+
 // Dry frictions of joints: the forces between their two limits with which these are at rest after the step. They come
 // after all other forces, for a joint is held against these. Those that each joint alone would not be held by are at a
 // limit at first; held ones beyond a limit go there, and are held again where they would be pushed back (block pivoting,
 // Judice and Pires 1994, which ends after two or three rounds). A soft one is MuJoCo's own constraint of frictionloss
 // (documentation, "Computation"): a + v / tau + R F = 0 with R = (1 - d) / d of the joint's inverse inertia.
-// `most`: how many terms of a program are such frictions.
+// A joint whose dry friction is a law's has its own frictionloss in these limits too, and none left for MuJoCo: what one
+// bearing does either holds or creeps. `most`: how many terms of a program are such frictions.
 static void hold(const mjModel* m, mjData* d, const Program* program, int most) {
   int nv = m->nv, n = 0, dofs[most], held[most], solved[most];
   double load[nv], total[nv], after[nv], unit[nv];
@@ -447,6 +459,10 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     s.way = 1, low[i] += evaluate(term, &s).x;
     s.way = -1, high[i] += evaluate(term, &s).x;
   }
+  int taken = 0;
+  for (int i = 0; i < n; i++)
+    if (low[i] || high[i]) taken |= take_frictionloss(d, dofs[i], low + i, high + i);
+  if (taken) island(m, d);   // it has copied them
   for (int i = 0; i < n; i++) {
     int dof = dofs[i], own = m->M_rowadr[dof] + m->M_rownnz[dof] - 1;   // the diagonal is the last of a row
     double v = d->qvel[dof], hard = m->dof_solimp[mjNIMP * dof], longer = fmax(tau[i], m->opt.timestep);
