@@ -24,10 +24,11 @@ from compass_ros.cells import Cell, load
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery.candidates import candidates
 from compass_ros.discovery.first_order import FirstOrder, Ranked
-from compass_ros.discovery.fits import finished, from_parent, race, whole
+from compass_ros.discovery.fits import finished, from_parent, whole
 from compass_ros.discovery.form import left_over
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.neighbours import STEPS, modest, rank
+from compass_ros.discovery.race import race
 from compass_ros.estimation import estimate_parameters
 from compass_ros.posing import Posed
 from compass_ros.selection import evenly, split, unlike

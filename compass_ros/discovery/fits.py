@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import log
 
 import numpy as np
 
 from compass_ros.calibration.cost import Point, cost, robust_loss
 from compass_ros.calibration.differences import Linear, difference_steps, extended
-from compass_ros.calibration.least_squares import Fit, minimise
-from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import Strongest, growing, strongest
+from compass_ros.calibration.least_squares import minimise
 from compass_ros.calibration.residuals import typical_residual
 from compass_ros.calibration.settle import settled
-from compass_ros.discovery.discrepancy import free
 from compass_ros.discovery.evidence import solve
 from compass_ros.discovery.first_order import WIDTH, Ranked
 from compass_ros.discovery.hypothesis import Hypothesis, widened
-from compass_ros.discovery.response import respond
-from compass_ros.discovery.settings import PRIOR_UNKNOWN, SLIGHT
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats, Ints
 
@@ -31,8 +25,6 @@ TELLING = 300.0
 is over: a budget. Where a hundredth of it decides, more recordings only cost time."""
 LEAST = 3
 """Of these episodes, at least: as many as a verdict needs."""
-ETA = 3
-"""One in so many goes on (Li et al. 2018, Hyperband: 3 or 4)."""
 FEW = 5
 """Gauss-Newton steps of a fit that begins near its end."""
 _LAST = 0.3
@@ -106,41 +98,7 @@ def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:
     return change
 
 
-def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats]], rows: Ints) -> list[Begun]:
-    """The best of models with one law more each, by successive halving over a growing horizon of some episodes.
-
-    A simulator without a law bends other parameters to stand for it, and from there a fit may end in a valley beside
-    the right one. So the parent is fitted anew from the cell's first guess, to the beginning of each episode and to
-    more and more of it, until a free discrepancy is called for: the fit before that is not bent yet. From there each
-    law goes on, to the next horizon the better third of them and all that are as likely as SLIGHT of the best.
-    `starts`: each law with its (q,) numbers.
-    """
-    if not starts:
-        return []
-    values, begun, horizons = _unbent(parent, rows)
-    runners = [_runner(parent, laws, np.append(values, numbers), rows, begun, horizons)
-               for laws, numbers in starts]  # fmt: skip
-    alive = list(range(len(runners)))
-    found: dict[int, tuple[Likelihood, Fit]] = {}
-    for _ in horizons:
-        for i in alive:
-            found[i] = next(runners[i])
-        alive = sorted(alive, key=lambda i: found[i][1].point.cost)
-        last = max(len(alive) // ETA, 2)
-        least = found[alive[0]][1].point.cost - log(SLIGHT)
-        alive = [i for k, i in enumerate(alive) if k < last or found[i][1].point.cost < least]
-    return [_at_the_end(parent, starts[i][0], *found[i]) for i in alive] if horizons else []
-
-
-def _at_the_end(parent: Hypothesis, laws: tuple[Attached, ...], likelihood: Likelihood, fit: Fit) -> Begun:
-    """Some steps more with all parameters of the parent free, and its loss."""
-    free, steps = _with_law(parent, fit.point.values)
-    robust = max(parent.fit.robust, 3.0 * typical_residual(likelihood, fit.point))
-    point = minimise(likelihood, fit.point, free, FEW, robust, 3.0, steps=steps, fresh=False).point
-    return Begun(laws, replace(point, cost=float(cost(likelihood, [point], parent.fit.robust)[0][0])), bent=False)
-
-
-def _with_law(parent: Hypothesis, values: Floats) -> tuple[Ints, Floats]:
+def with_law(parent: Hypothesis, values: Floats) -> tuple[Ints, Floats]:
     """What is free in a model with one law more, of (P + q,) values, and (p + q,) steps of its differences.
 
     All that is free in its parent, and the law, whose first steps are a modest size.
@@ -150,53 +108,13 @@ def _with_law(parent: Hypothesis, values: Floats) -> tuple[Ints, Floats]:
     return np.concatenate([parent.fit.free, own]), steps
 
 
-def _unbent(parent: Hypothesis, rows: Ints) -> tuple[Floats, Strongest, tuple[float, ...]]:
-    """(P,) the parent's model fitted to the longest horizon that calls for nothing more, and the longer ones.
-
-    With all that is free in it, to the end: what a fit still lacks, a discrepancy seems to be called for.
-    """
-    likelihood, first = parent.likelihood.of(rows), len(parent.simulator.cell.parameters)
-    values = parent.likelihood.prior_mean.copy()
-    values[first:] = parent.fit.point.values[first:]
-    begun, shapes = strongest(likelihood, values), first + _shapes(parent.laws)
-    horizons, steps = likelihood.horizons, difference_steps(parent.fit.linear)
-    for k, (part, rough) in enumerate(growing(likelihood, values, shapes, begun)):
-        fit = minimise(part, rough.point, parent.fit.free, 2 * FEW, parent.fit.robust, 1.0, steps=steps, fresh=False)
-        found = free(respond(parent.simulator, part, fit))
-        if found.log + PRIOR_UNKNOWN > found.alone:
-            return values, begun, horizons[k:]
-        values = fit.point.values
-    return values, begun, ()
-
-
-def _shapes(laws: Sequence[Attached]) -> Ints:
-    """Places of shapes among the numbers of laws."""
-    return np.flatnonzero(~np.concatenate([np.empty(0, bool), *(a.amplitudes for a in laws)]))
-
-
-def _runner(
-    parent: Hypothesis,
-    laws: Sequence[Attached],
-    values: Floats,
-    rows: Ints,
-    begun: Strongest,
-    horizons: tuple[float, ...],
-) -> Iterator[tuple[Likelihood, Fit]]:
-    """Fits of one model to some episodes, longer from one to the next; shapes stay as they are."""
-    simulator, likelihood = widened(parent.simulator, parent.likelihood, laws)
-    new = len(parent.fit.point.values) + np.flatnonzero(np.concatenate([a.amplitudes for a in laws]))
-    held = len(simulator.cell.parameters) + _shapes((*parent.laws, *laws))
-    begun = begun.beside(values, new, np.full(len(new), 1 / WIDTH))
-    return growing(likelihood.of(rows), values, held, begun, horizons)
-
-
 def whole(parent: Hypothesis, begun: Begun) -> Hypothesis:
     """A model fitted to all episodes, with exact differences at the end.
 
     One that began at its parent's fit goes on with the differences there as long as they hold.
     """
     simulator, likelihood = widened(parent.simulator, parent.likelihood, begun.laws)
-    free, steps = _with_law(parent, begun.point.values)
+    free, steps = with_law(parent, begun.point.values)
     point, linear = begun.point, begun.linear
     if linear is None:
         point = Point(point.values, parent.fit.point.launch, np.inf)

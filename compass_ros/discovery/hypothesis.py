@@ -5,24 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import sqrt
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import Fit, normal_equations
+from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.residuals import covariance, jackknife, variances
+from compass_ros.calibration.residuals import covariance, variances
 from compass_ros.discovery.discrepancy import Free, free, spread, with_law
 from compass_ros.discovery.first_order import WIDTH
 from compass_ros.discovery.response import Response, respond
+from compass_ros.discovery.zero import Zero, zero
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
 
 SPREADS = (0.3, 1.0, 3.0, 10.0, 30.0)
 """Spreads of a law of chance that are equally probable before, in its modest size."""
-ERROR_BARS = 2.0
-"""Error bars from zero within which a law is not named: a 95 % interval that holds its absence."""
 
 
 def name_of(laws: Sequence[Attached]) -> str:
@@ -157,44 +155,10 @@ class Hypothesis:
             yield attached, slice(at, at + size)
             at += size
 
-    @property
-    def weakest(self) -> Attached | None:
-        """Of its laws that lie within ERROR_BARS of zero the one that lies nearest: those that do nearly the same are
-        each unsure beside the other."""
-        nearest, weakest = min(self.error_bars, key=lambda pair: pair[0], default=(np.inf, None))
-        return weakest if nearest < ERROR_BARS else None
-
     @cached_property
-    def error_bars(self) -> tuple[tuple[float, Attached], ...]:
-        """How many error bars from zero each law lies, all its amplitudes together; none of chance among them.
-
-        The longer ones of those that the noise leaves and those by which the episodes disagree, with the shapes as they
-        are: at zero these mean nothing, and an amplitude may be unsure because its shape is. Along directions of which
-        the recordings say less than the prior nothing is judged: where only ratios show, all numbers are unsure by one
-        common factor, and none of them is near zero for that. A scatter is judged by its episodes.
-        """
-        fit = self._with_shapes_held
-        free, p = fit.free, len(fit.free)
-        hessian, _ = normal_equations(self.likelihood, fit.point, fit.linear, free, fit.robust)
-        prior = np.eye(len(hessian))
-        errors = np.linalg.inv((hessian - prior) / self.likelihood.correlation_time + prior)[:p, :p]
-        told, axes = np.linalg.eigh(np.linalg.inv(errors) - np.eye(p))
-        axes = axes[:, told > 1.0]
-        away = ((fit.point.values - self.likelihood.prior_mean) / self.likelihood.prior_std)[free]
-        bars = [axes.T @ cov @ axes for cov in (errors, jackknife(self.likelihood, fit))]
-        far: list[tuple[float, Attached]] = []
-        for attached, numbers in self.own():
-            own = np.isin(free, numbers.start + np.flatnonzero(attached.amplitudes))
-            if not attached.effect.scattered:
-                far.append((min(_far(away[own], axes[own] @ c @ axes[own].T) for c in bars), attached))
-        return tuple(far)
-
-    @property
-    def _with_shapes_held(self) -> Fit:
-        """The fit with the shapes of its laws no longer free."""
-        shapes = [n.start + np.flatnonzero(~attached.amplitudes) for attached, n in self.own()]
-        kept = np.flatnonzero(~np.isin(self.fit.free, np.concatenate([*shapes, np.empty(0, int)])))
-        return replace(self.fit, linear=self.fit.linear.only(kept), free=self.fit.free[kept])
+    def zero(self) -> Zero:
+        """Which of its laws may be zero."""
+        return zero(self.likelihood, self.fit, tuple(self.own()))
 
     @property
     def rho(self) -> float:
@@ -219,10 +183,3 @@ def widened(simulator: Simulator, likelihood: Likelihood, added: Sequence[Attach
         prior_mean=np.concatenate([likelihood.prior_mean, mean]),
         prior_std=np.concatenate([likelihood.prior_std, std]),
     )
-
-
-def _far(away: Floats, errors: Floats) -> float:
-    """How many error bars (n,) amplitudes are from zero, with (n, n) errors; infinitely many where these are 0."""
-    if not np.any(errors):
-        return np.inf
-    return sqrt(max(float(away @ np.linalg.lstsq(errors, away, rcond=None)[0]), 0.0))

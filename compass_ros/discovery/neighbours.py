@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import log
 
 import numpy as np
@@ -10,13 +10,14 @@ import numpy as np
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.discrepancy import to_first_order
 from compass_ros.discovery.first_order import FirstOrder, Ranked
-from compass_ros.discovery.fits import Begun, from_parent, race, telling, whole
+from compass_ros.discovery.fits import Begun, from_parent, telling, whole
 from compass_ros.discovery.hypothesis import Hypothesis, name_of
 from compass_ros.discovery.odds import Known, Prior
+from compass_ros.discovery.race import race
 from compass_ros.discovery.scatter import ranked_scatter, with_scatter
 from compass_ros.discovery.settings import SLIGHT
 from compass_ros.simulation.effects import Attached
-from compass_ros.simulation.sites import PLANAR
+from compass_ros.simulation.sites import PLANAR, Site
 from compass_ros.types import Floats
 
 RACED = 4
@@ -28,20 +29,24 @@ STEPS = 4
 def rank(first: FirstOrder, candidates: Sequence[Candidate]) -> list[Ranked]:
     """Laws at their best shape, the one that promises most first.
 
-    Joints, drives, pairs and signals have each a size of their own too; what moves in one plane has a law in common or
-    alone.
+    Where sites have each a size of their own (`_separate`), laws are ranked on several of them too.
     """
     of_chance = [ranked_scatter(first.response, c) for c in candidates if c.attached.effect.scattered]
     found = [best for c in candidates if not c.attached.effect.scattered for best in first.ranked(c)[:1]]
     moving, alone = first.response.simulator.moving, dict[str, list[Ranked]]()
     for one in found:
-        own = [moving[name].kind for name in one.candidate.objects if name in moving]
-        alike = one.candidate.attached.effect.moves and any(kind in PLANAR for kind in own)
-        own_size = not one.candidate.attached.effect.apart and bool(one.candidate.objects) and not alike
-        if one.candidate.alone and one.gain > 0 and own_size:
+        if one.gain > 0 and _separate(one.candidate, moving):
             alone.setdefault(one.candidate.name, []).append(one)
     several = (first.together(singles) for singles in alone.values() if len(singles) > 1)
     return sorted([*found, *of_chance, *(one for one in several if one)], key=lambda f: -f.gain)
+
+
+def _separate(candidate: Candidate, moving: Mapping[str, Site]) -> bool:
+    """Whether it is on one of several sites that have each a size of their own: joints, drives, pairs, signals. What
+    moves in one plane has a law in common or alone."""
+    effect = candidate.attached.effect
+    alike = effect.moves and any(moving[name].kind in PLANAR for name in candidate.objects if name in moving)
+    return candidate.alone and bool(candidate.objects) and not (effect.apart or alike)
 
 
 def widen(known: Known, best: Hypothesis, ranked: Sequence[Ranked], called: bool) -> None:
@@ -122,11 +127,8 @@ def promising(ranked: Sequence[Ranked], parent: Hypothesis) -> list[Ranked]:
 
 
 def cold_starts(ranked: Sequence[Ranked], parent: Hypothesis) -> list[tuple[tuple[Attached, ...], Floats]]:
-    """Each law that the parent lacks, on the sites that promise most, at a modest size.
-
-    One of contacts starts on all pairs: which of them it is on, a fit that is bent cannot say, for what a bounce
-    changes moves all that follows.
-    """
+    """Each law that the parent lacks, at a modest size, on all sites that have a size of their own: which of them it is
+    on, a fit that is bent cannot say. Another one on the sites that promise most."""
     has = {a.effect.name for a in parent.laws}
     of: dict[str, list[Ranked]] = {}
     for r in ranked:
@@ -134,8 +136,7 @@ def cold_starts(ranked: Sequence[Ranked], parent: Hypothesis) -> list[tuple[tupl
             of.setdefault(r.candidate.name, []).append(r)
     out = []
     for same in of.values():
-        pairs = [r for r in same if r.candidate.alone and r.candidate.attached.effect.paired]
-        chosen = pairs or same[:1]
+        chosen = [r for r in same if _separate(r.candidate, parent.simulator.moving)] or same[:1]
         parts = tuple(part for r in chosen for part in r.candidate.parts)
         out.append((parts, np.concatenate([modest(r) for r in chosen])))
     return out

@@ -21,6 +21,7 @@ from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.neighbours import exchange, rank, widen
 from compass_ros.discovery.odds import Known, Prior
 from compass_ros.discovery.settings import PRIOR_UNKNOWN, RHO, RHO_PRIOR, SLIGHT
+from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
 
 DEEPEST = 3
@@ -92,24 +93,35 @@ def finish(known: Known, others: Sequence[float]) -> None:
     """Bring the models that hold all but SLIGHT of the probability to their optimum, in place.
 
     What a fit still lacks there, and rough differences, are worth some units of log evidence: as much as two laws may
-    be apart, or a discrepancy may stand for; and first order is what it says about an optimum alone. A model with a law
-    that is within its error bars of zero, as the noise leaves them or as the episodes disagree on it
-    (`Hypothesis.weakest`), is the model without that law, and stands for it: laws go one by one, since each is unsure
-    beside another that does nearly the same. Before its last steps one goes only where that is as probable. `others`:
-    log odds of models without a law.
+    be apart, or a discrepancy may stand for; and first order is what it says about an optimum alone. A law is named
+    where it is more than its error bars from zero on all its sites together, as the noise leaves them and as the
+    episodes disagree on it; which of them it is on is a matter of evidence. So a model with a law that may be zero
+    stands for the one without it, and one with a site that may lack its law where that is as probable, one after the
+    other, since each is unsure beside another that does nearly the same. Before its last steps it is so where the model
+    without is as probable. `others`: log odds of models without a law.
     """
     while (name := _unfinished(known, others)) is not None:
         begun, odds = known.models.pop(name)
         known.finished.add(name)
-        if len(begun.laws) > 1 and (weakest := begun.weakest):
-            less = known.without(begun, [weakest])
-            if less and less[1] >= odds:
-                continue  # its optimum is not worth the search for it
+        if any(
+            _as_probable_without(known, begun, odds, part) for part in (begun.zero.weakest, begun.zero.weakest_site)
+        ):
+            continue  # its optimum is not worth the search for it
         model = finished(begun)
-        if (weakest := model.weakest) is None:
-            known.models[name] = model, known.odds(model, model.log_evidence)
-        elif len(model.laws) > 1:
-            known.without(model, [weakest])
+        odds = known.odds(model, model.log_evidence)
+        if weakest := model.zero.weakest:
+            if len(weakest) < len(model.laws):
+                known.without(model, weakest)
+        elif not _as_probable_without(known, model, odds, model.zero.weakest_site):
+            known.models[name] = model, odds
+
+
+def _as_probable_without(known: Known, model: Hypothesis, odds: float, laws: Sequence[Attached]) -> bool:
+    """Whether a model without some of its laws is as probable; not where that leaves none, or these are none."""
+    if not 0 < len(laws) < len(model.laws):
+        return False
+    less = known.without(model, laws)
+    return less is not None and less[1] >= odds
 
 
 def _unfinished(known: Known, others: Sequence[float]) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from compass_ros.discovery.hypothesis import ERROR_BARS
+from compass_ros.discovery.zero import ERROR_BARS
 from compass_ros.simulation.effects import Attached
 from compass_ros.simulation.sites import Places
 from compass_ros.types import Channel, DependsOn, EffectFinding, Floats, Phase, Region, Unit, Where

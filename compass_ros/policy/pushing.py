@@ -94,12 +94,14 @@ class Pushes:
     seen: int = 6
     chosen: int = 2
     horizon: int = HORIZON
+    across: float = 0.0
+    """Where the tool begins [m]."""
 
     def __post_init__(self) -> None:
         self.count = self.bars.count
 
     def reset(self) -> Floats:
-        self._now, self._tool = self.bars.reset(np.zeros(self.count))
+        self._now, self._tool = self.bars.reset(np.full(self.count, self.across))
         self._time = 0
         return looked(self._now, self._tool, 0)
 
@@ -134,14 +136,17 @@ def near(bar: Floats) -> Bools:
     return np.asarray((away <= NEAR_M) & (np.abs(bar[:, 2] - TARGET[2]) <= NEAR_RAD))
 
 
-def train_pushing(bars: Bars, seed: int, transitions: int = TRANSITIONS, report: Report = silent) -> Policy:
-    """A policy from one simulator. The same seed gives the same bits on the same machine."""
-    return learn(Pushes(bars), transitions, seed, SETTINGS, report)
+def train_pushing(
+    bars: Bars, seed: int, transitions: int = TRANSITIONS, report: Report = silent, across: float = 0.0
+) -> Policy:
+    """A policy from one simulator, whose tool begins so far across. The same seed gives the same bits on the same
+    machine."""
+    return learn(Pushes(bars, across=across), transitions, seed, SETTINGS, report)
 
 
-def played(policy: Policy, bars: Bars, rng: Generator | None = None) -> Floats:
+def played(policy: Policy, bars: Bars, rng: Generator | None = None, across: float = 0.0) -> Floats:
     """(HORIZON + 1, B, 3) what is seen of the bars while the policy pushes them."""
-    bar, tool = bars.reset(np.zeros(bars.count))
+    bar, tool = bars.reset(np.full(bars.count, across))
     path = [bar]
     for step in range(HORIZON):
         bar, tool = bars.step(MIDDLE + HALF * policy.act(looked(bar, tool, step), rng))

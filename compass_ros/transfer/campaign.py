@@ -77,7 +77,7 @@ def one_policy(
     elif condition != base:
         belief = experiment.told(belief, condition, own)
     if experiment.over_time is not None:
-        return over_time(experiment, belief, simulator, own, seed, report)
+        return over_time(experiment, belief, condition, simulator, own, seed, report)
     began, worked = perf_counter(), process_time()
     shots = Shots(experiment.cell, belief, experiment.goal, experiment.repeats)
     before = [known[key] for key in earlier(experiment, condition, simulator, plan, seed) if key in known]
@@ -99,22 +99,23 @@ def one_policy(
 
 
 def over_time(
-    experiment: Experiment, belief: Belief, simulator: str, folder: Path, seed: int, report: Report = silent,
-    transitions: int = pushing.TRANSITIONS,
+    experiment: Experiment, belief: Belief, condition: str, simulator: str, folder: Path, seed: int,
+    report: Report = silent, transitions: int = pushing.TRANSITIONS,
 ) -> dict[str, object]:  # fmt: skip
     """Train and play one policy over time; it is kept in the folder."""
     assert experiment.over_time is not None
     count, repeats = pushing.SIDE_BY_SIDE, float(experiment.repeats[0])
+    across = experiment.across.get(condition, 0.0)
     own: pushing.Bars = (
         experiment.over_time(count, seed) if simulator == "itself" else pushing.Simulated(belief, count, seed, repeats)
     )
     began, worked = perf_counter(), process_time()
-    policy = pushing.train_pushing(own, seed, transitions, report)
+    policy = pushing.train_pushing(own, seed, transitions, report, across)
     wall, cpu = perf_counter() - began, process_time() - worked
     folder.mkdir(parents=True, exist_ok=True)
-    policy.save(folder / f"policy-{simulator}-{seed}.npz")
-    promised = pushing.near(pushing.played(policy, own)[-1])
-    end = pushing.played(policy, experiment.over_time(SHOTS, 1000 + seed))[-1]
+    policy.save(folder / f"policy-{simulator}-{condition}-{seed}.npz")
+    promised = pushing.near(pushing.played(policy, own, across=across)[-1])
+    end = pushing.played(policy, experiment.over_time(SHOTS, 1000 + seed), across=across)[-1]
     hit, distance = pushing.near(end), np.linalg.norm(end[:, :2] - pushing.TARGET[:2], axis=1)
     return _counted(hit, distance, PAPER) | {
         "promised": round(float(promised.mean()), 3),

@@ -25,6 +25,8 @@ HEAVY = 1.1
 """Pucks with a tenth more of mass."""
 MOVED = ((-0.16, 0.015), (-0.08, -0.06))
 """Other places of the pucks at the start [m]."""
+ACROSS = 0.03
+"""Where the tool begins across the bar instead of behind its middle [m]: there a push turns it away from the target."""
 
 
 def _as_it_was(belief: Belief, condition: str, folder: Path) -> Belief:
@@ -50,6 +52,8 @@ class Experiment:
     """Changed conditions, and the one whose recordings simulators and policies come from."""
     over_time: Callable[[int, int], Bars] | None = None
     """Count, seed -> the concealed cell in steps, where a policy acts over time; None: its action is one command."""
+    across: Mapping[str, float] = field(default_factory=dict)
+    """Conditions in which the tool of a policy over time begins so far across [m]."""
     replayed: tuple[str, ...] = ()
     """Changed conditions of which nobody is told anything: the old policies play."""
 
@@ -176,7 +180,9 @@ def push_i() -> Experiment:
         Goal("bar", (*pushing.TARGET[:2], 0.0), pushing.NEAR_M),
         ("real",),
         play,
+        changed={"real-moved": "real"},
         over_time=lambda count, seed: bar.Pushing(task, count, seed),
+        across={"real-moved": ACROSS},
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from compass_ros.calibration.cost import start
 from compass_ros.calibration.least_squares import minimise
-from compass_ros.discovery.hypothesis import ERROR_BARS, Hypothesis, widened
+from compass_ros.discovery.hypothesis import Hypothesis, widened
 from compass_ros.discovery.odds import Known, Prior
 from compass_ros.discovery.search import finish
 from compass_ros.simulation.effects import Attached, effect
@@ -22,11 +22,12 @@ def test_of_two_laws_that_do_the_same_one_stays() -> None:
     everything = np.concatenate([free, np.arange(len(likelihood.parameters), len(wider.parameters))])
     fit = minimise(wider, start(wider, wider.prior_mean), everything, 20, 4.0)
     both = Hypothesis(tuple(laws), simulator, wider, fit, without=plain.fit.linear.residual)
-    assert [far < ERROR_BARS for far, _ in both.error_bars] == [True, True]
+    assert [both.zero.may_lack([law]) for law in laws] == [True, True]
+    assert not both.zero.may_lack(laws)
     alone = Hypothesis((), plain.simulator, likelihood, plain.fit).free.alone
     known = Known(Prior.of(asked_of_table()), alone, {both.name: (both, 0.0)}, set())
     finish(known, (-50.0,))
     assert len(known.models) == 1
     ((left, _),) = known.models.values()
     assert len(left.laws) == 1
-    assert left.weakest is None
+    assert left.zero.weakest == ()

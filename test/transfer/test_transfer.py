@@ -12,7 +12,7 @@ import pytest
 
 from compass_ros.cells import load
 from compass_ros.errors import ConfigError
-from compass_ros.policy import Belief, belief, one
+from compass_ros.policy import Belief, belief, one, pushing
 from compass_ros.policy.augmented import augmented
 from compass_ros.policy.residual import Ensemble, Residual
 from compass_ros.simulation import Simulator
@@ -54,12 +54,28 @@ def test_a_campaign_goes_on_where_it_was(tmp_path: Path) -> None:
 def test_a_policy_over_time_is_trained_played_and_kept(tmp_path: Path) -> None:
     task = push_i()
     belief_ = one(Simulator(task.cell, threads=1, options={"timestep": 0.001}), task.cell.defaults)
-    rows = [campaign.over_time(task, belief_, "nominal", tmp_path, 0, transitions=64) for _ in range(2)]
+    rows = [campaign.over_time(task, belief_, "real", "nominal", tmp_path, 0, transitions=64) for _ in range(2)]
     assert {k: v for k, v in rows[0].items() if not k.startswith("trained")} == {
         k: v for k, v in rows[1].items() if not k.startswith("trained")
     }
-    assert (tmp_path / "policy-nominal-0.npz").is_file()
+    assert (tmp_path / "policy-nominal-real-0.npz").is_file()
     assert 0 <= float(str(rows[0]["success"])) <= 1
+
+
+def test_a_tool_begins_elsewhere_in_a_changed_condition() -> None:
+    task = push_i()
+    belief_ = one(Simulator(task.cell, threads=1, options={"timestep": 0.001}), task.cell.defaults)
+    across = task.across["real-moved"]
+    assert task.changed["real-moved"] == "real"
+    assert task.over_time is not None
+    for bars in (pushing.Simulated(belief_, 4, 0, 0.0), task.over_time(4, 0)):
+        np.testing.assert_allclose(
+            bars.reset(np.full(4, across))[1][:, 1], across, atol=5e-3
+        )  # the arm's repeatability is 1 mm
+        for _ in range(4):  # pushed beside its middle, the bar turns away from the target's angle
+            now, _ = bars.step(np.tile([0.2, 0.0], (4, 1)))
+        assert np.all(now[:, 2] < -0.02)
+    assert pushing.TARGET[2] > 0
 
 
 def test_a_network_of_control_steps_learns_how_a_bar_turns() -> None:

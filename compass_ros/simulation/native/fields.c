@@ -419,26 +419,18 @@ static void solve_small(int n, double* a, double* x) {
   }
 }
 
-// Adds a joint's own frictionloss to the limits of its friction, and leaves none to MuJoCo's constraint; whether it had any.
-static int take_frictionloss(mjData* d, int dof, double* low, double* high) {
-  for (int row = d->ne; row < d->ne + d->nf; row++) {
-    if (d->efc_type[row] != mjCNSTR_FRICTION_DOF || d->efc_id[row] != dof) continue;
-    *low -= d->efc_frictionloss[row], *high += d->efc_frictionloss[row];
-    d->efc_frictionloss[row] = 0;
-    return 1;
-  }
-  return 0;
-}
-
 // Dry frictions of joints: the forces between their two limits with which these are at rest after the step. They come
 // after all other forces, for a joint is held against these. Those that each joint alone would not be held by are at a
 // limit at first; held ones beyond a limit go there, and are held again where they would be pushed back (block pivoting,
 // Judice and Pires 1994, which ends after two or three rounds). A soft one is MuJoCo's own constraint of frictionloss
 // (documentation, "Computation"): a + v / tau + R F = 0 with R = (1 - d) / d of the joint's inverse inertia.
-// A joint whose dry friction is a law's has its own frictionloss in these limits too, and none left for MuJoCo: what one
-// bearing does either holds or creeps. `most`: how many terms of a program are such frictions.
+// Where there is such a law all joints' frictionloss is solved for here and none is left for MuJoCo, which would move what
+// is held: that of a joint with a law is in its limits, and holds or creeps with it; that of the others is as soft as it is.
+// `most`: how many terms of a program are such frictions.
 static void hold(const mjModel* m, mjData* d, const Program* program, int most) {
-  int nv = m->nv, n = 0, dofs[most], held[most], solved[most];
+  int nv = m->nv, n = 0, any = 0;
+  most += d->nf;
+  int dofs[most], held[most], solved[most], row[most];   // row: of MuJoCo's own constraint, where it is all there is
   double load[nv], total[nv], after[nv], unit[nv];
   double low[most], high[most], tau[most], give[most];   // of a soft friction: time constant [s], R
   double force[most], limit[most], right[most], column[most * nv], matrix[most * most];
@@ -453,21 +445,29 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     if (!dry(term)) continue;
     int i = 0;
     while (i < n && dofs[i] != term->dof) i++;
-    if (i == n) dofs[n++] = term->dof, low[i] = high[i] = tau[i] = solved[i] = 0;
+    if (i == n) dofs[n++] = term->dof, low[i] = high[i] = tau[i] = solved[i] = 0, row[i] = -1;
     if (term->kind == COULOMB) tau[i] = fmax(tau[i], term->number[1]);
     State s = joint_state(m, d, term);
     s.way = 1, low[i] += evaluate(term, &s).x;
     s.way = -1, high[i] += evaluate(term, &s).x;
+    any |= low[i] || high[i];
   }
-  int taken = 0;
-  for (int i = 0; i < n; i++)
-    if (low[i] || high[i]) taken |= take_frictionloss(d, dofs[i], low + i, high + i);
-  if (taken) island(m, d);   // it has copied them
+  if (!any) return;
+  for (int r = d->ne; r < d->ne + d->nf; r++) {
+    if (d->efc_type[r] != mjCNSTR_FRICTION_DOF) continue;
+    int i = 0;
+    while (i < n && dofs[i] != d->efc_id[r]) i++;
+    if (i == n) dofs[n++] = d->efc_id[r], low[i] = high[i] = solved[i] = 0;
+    if (!low[i] && !high[i]) row[i] = r, tau[i] = 1 / d->efc_KBIP[4 * r + 1];
+    low[i] -= d->efc_frictionloss[r], high[i] += d->efc_frictionloss[r];
+    d->efc_frictionloss[r] = 0;
+  }
+  if (d->nf) island(m, d);   // it has copied them
   for (int i = 0; i < n; i++) {
     int dof = dofs[i], own = m->M_rowadr[dof] + m->M_rownnz[dof] - 1;   // the diagonal is the last of a row
     double v = d->qvel[dof], hard = m->dof_solimp[mjNIMP * dof], longer = fmax(tau[i], m->opt.timestep);
     if (low[i] > high[i]) low[i] = high[i] = v > 0 ? low[i] : v < 0 ? high[i] : 0;   // less than none: along the motion
-    give[i] = (1 - hard) / hard * m->dof_invweight0[dof] * tau[i] / longer;
+    give[i] = (row[i] < 0 ? (1 - hard) / hard * m->dof_invweight0[dof] : d->efc_R[row[i]]) * tau[i] / longer;
     tau[i] = longer;
     double own_give = d->M[own] * give[i], middle = (low[i] + high[i]) / 2;
     double stop = (own_give * middle - d->M[own] * v / tau[i] - load[dof]) / (1 + own_give);

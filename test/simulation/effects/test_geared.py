@@ -98,6 +98,48 @@ def test_friction_holds_a_joint_against_a_load_below_it(
     assert abs(rate) < 1e-9
 
 
+@pytest.mark.parametrize("size", [-0.1, 0.0, 0.1])
+@pytest.mark.parametrize("law", ["stribeck_friction", "asymmetric_friction"])
+def test_a_joints_own_friction_holds_with_a_laws(law: str, size: float) -> None:
+    """Frictionloss and law together bear the load without a creep; without a law frictionloss creeps as MuJoCo's."""
+    model = axis('<motor name="m" joint="axis"/>', step=1e-3)
+    model.dof_frictionloss[0] = 0.2
+    numbers = (size, 0.5) if law == "stribeck_friction" else (size,)
+    position, rate = moved(model, laws((law, numbers, "axis")), (0.3, 0.0), 10.0, told=0.9 * (0.2 + size))
+    if size:
+        assert abs(position - 0.3) < 1e-9
+        return
+    alone, its_rate = moved(model, laws(), (0.3, 0.0), 10.0, told=0.18)
+    np.testing.assert_allclose((position, rate), (alone, its_rate), rtol=1e-12)
+    assert position - 0.3 > 0.03
+
+
+@pytest.mark.parametrize("middle", [0.5, 4.0])
+def test_joints_beside_one_with_a_law_keep_mujocos_friction(middle: float) -> None:
+    """Three links whose middle joint has a law that is as soft as frictionloss: all move as with frictionloss alone."""
+    model, ends = three_links(0.001), []
+    for given in (laws(("coulomb_friction", (middle, SOFT_S), "j1")), laws()):
+        model.dof_frictionloss[:] = 8.0, 0.0 if given.effects else middle, 1.3
+        data = mujoco.MjData(model)
+        with attach(model, data, given):
+            mujoco.mj_step(model, data, nstep=1500)
+        ends.append(data.qpos.copy())
+    assert np.abs(ends[1]).max() > 0.3
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-3)
+
+
+@pytest.mark.parametrize("on", ["j0", "j2"])
+def test_a_joint_is_held_while_others_creep(on: str) -> None:
+    """What MuJoCo's frictionloss of the others does to a held joint is borne by its friction too."""
+    model = three_links(0.001)
+    model.dof_frictionloss[:] = 8.0, 4.0, 1.3
+    data = mujoco.MjData(model)
+    with attach(model, data, laws(("coulomb_friction", (1.0,), on))):
+        mujoco.mj_step(model, data, nstep=1500)
+    assert abs(data.joint(on).qpos[0]) < 1e-3
+    assert np.abs(data.qpos).max() > 0.1
+
+
 @pytest.mark.parametrize(("law", "numbers"), FRICTIONS[:3])
 def test_friction_lets_go_above_it(law: str, numbers: tuple[float, ...]) -> None:
     model = axis('<motor name="m" joint="axis"/>', step=1e-3)
