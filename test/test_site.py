@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 
 from compass_ros.simulation.effects import EFFECTS
 from scripts.cli_reference import PAGE, page
-from scripts.draw_laws import BEGIN, END, FOLDER, PICTURES, drawn, gallery
+from scripts.draw_laws import BEGIN, END, FOLDER, drawn, gallery
+from scripts.law_pictures.catalogue import PICTURES
 from scripts.site_hooks import BESIDE, within_docs
 from test.test_readme import DOCUMENTS
 
@@ -86,7 +87,7 @@ def test_the_reference_of_python_names_what_there_is() -> None:
 
 
 def test_every_law_has_its_line_and_its_picture() -> None:
-    """`python scripts/draw_laws.py` draws them anew."""
+    """`python -m scripts.draw_laws` draws them anew."""
     assert set(PICTURES) == set(EFFECTS)
     text = (DOCS / "laws.md").read_text("utf-8")
     assert text.split(BEGIN)[1].split(END)[0].strip() == gallery().strip()
