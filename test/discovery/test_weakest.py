@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+import pytest
 
 from compass_ros.calibration.cost import start
 from compass_ros.calibration.least_squares import minimise
 from compass_ros.discovery.hypothesis import Hypothesis, widened
 from compass_ros.discovery.odds import Known, Prior
 from compass_ros.discovery.search import finish
+from compass_ros.discovery.zero import Zero
 from compass_ros.simulation.effects import Attached, effect
+from compass_ros.simulation.sizes import unit_joint
+from compass_ros.types import Floats
 from test.discovery.planted import PUCKS, asked_of_table, recorded, response_of
 
 
@@ -31,3 +37,35 @@ def test_of_two_laws_that_do_the_same_one_stays() -> None:
     ((left, _),) = known.models.values()
     assert len(left.laws) == 1
     assert left.zero.weakest == ()
+
+
+def sites(away: Sequence[float], bars: Floats) -> tuple[list[Attached], Zero]:
+    """Coulomb friction on as many joints, each with a size, and which of them may be zero."""
+    own = [Attached(effect("coulomb_friction").at(unit_joint("hinge")), (f"j{i}",)) for i in range(len(away))]
+    at = tuple((a, np.array([i])) for i, a in enumerate(own))
+    return own, Zero(at, np.array(away), (bars, np.zeros_like(bars)))
+
+
+def test_a_law_that_raced_on_all_joints_stays_where_it_is() -> None:
+    own, zero = sites([5.0, 0.1, -1.4, 0.6], np.eye(4))
+    assert set(zero.absent(own)) == set(own[1:])
+    assert zero.weakest == ()
+    assert zero.weakest_site == (own[1],)
+
+
+def test_many_sites_that_are_each_small_may_not_all_be_zero_together() -> None:
+    """Eight of 1.9 error bars each: chi-square 28.9 of 8 numbers."""
+    own, zero = sites([1.9] * 8, np.eye(8))
+    assert all(zero.may_lack([a]) for a in own)
+    assert not zero.may_lack(own)
+    assert 0 < len(zero.absent(own)) < 8
+
+
+@pytest.mark.parametrize(("away", "absent"), [(0.5, 2), (6.0, 1)])
+def test_two_sites_that_do_nearly_the_same_go_one_by_one(away: float, absent: int) -> None:
+    """Each is unsure beside the other; their sum is known to half an error bar."""
+    wide = np.array([[100.0, -99.9], [-99.9, 100.0]])
+    own, zero = sites([away, away], wide)
+    assert len(zero.absent(own)) == absent
+    assert len(zero.weakest_site) == 1
+    assert len(zero.weakest) == (2 if absent == 2 else 0)
