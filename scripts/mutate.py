@@ -19,7 +19,7 @@ DISCOVERY = Path("compass_ros", "discovery")
 TESTS = tuple(
     f"test_{name}.py" for name in ("evidence", "first_order", "floor", "form", "weakest", "weigh", "servo", "unlisted")
 )
-"""Of test/discovery: those that bring about verdicts on toys, the quick ones first."""
+"""Of test/discovery: those that bring about verdicts on toys."""
 
 
 @dataclass(frozen=True)
