@@ -16,8 +16,6 @@ from compass_ros.discovery.hypothesis import Hypothesis, name_of
 from compass_ros.discovery.settings import PRIOR_LAW
 from compass_ros.simulation.effects import Attached
 
-LOWER = 1.0
-"""By which a cost is lower than another one [log likelihood]: models are compared by whole units."""
 Weighed = tuple[Hypothesis, float]
 """A model and its log posterior odds against the plain one."""
 
@@ -88,21 +86,6 @@ class Known:
         if name not in self.models:
             self.take([without(model, laws)])
         return self.models.get(name)
-
-    def begun_again(self, larger: Hypothesis) -> None:
-        """Fit the known models with one law less anew from the optimum of a larger one, which may lie elsewhere.
-
-        Where it is lower the new fit stands in the place of the old one, and is to be brought to its optimum.
-        """
-        for name in dict.fromkeys(a.effect.name for a in larger.laws):
-            own = [a for a in larger.laws if a.effect.name == name]
-            rest = name_of([a for a in larger.laws if a not in own])
-            if rest not in self.models:
-                continue
-            model = without(larger, own)
-            if model.fit.point.cost < self.models[rest][0].fit.point.cost - LOWER:
-                self.models[rest] = model, self.odds(model, model.log_evidence)
-                self.finished.discard(rest)
 
     def total(self, others: Iterable[float]) -> float:
         """Log odds of all models together, and of `others`."""

@@ -98,8 +98,7 @@ def finish(known: Known, others: Sequence[float]) -> None:
     episodes disagree on it; which of them it is on is a matter of evidence. So a model with a law that may be zero
     stands for the one without it, and one with a site that may lack its law where that is as probable, one after the
     other, since each is unsure beside another that does nearly the same. Before its last steps it is so where the model
-    without is as probable. From the optimum of a larger model those within it are begun again, for a fit may end in a
-    valley beside the lowest. `others`: log odds of models without a law.
+    without is as probable. `others`: log odds of models without a law.
     """
     while (name := _unfinished(known, others)) is not None:
         begun, odds = known.models.pop(name)
@@ -115,7 +114,6 @@ def finish(known: Known, others: Sequence[float]) -> None:
                 known.without(model, weakest)
         elif not _as_probable_without(known, model, odds, model.zero.weakest_site):
             known.models[name] = model, odds
-            known.begun_again(model)
 
 
 def _as_probable_without(known: Known, model: Hypothesis, odds: float, laws: Sequence[Attached]) -> bool:

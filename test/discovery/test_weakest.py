@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from compass_ros.calibration.cost import cost, start
+from compass_ros.calibration.cost import start
 from compass_ros.calibration.least_squares import minimise
 from compass_ros.discovery.hypothesis import Hypothesis, widened
 from compass_ros.discovery.odds import Known, Prior
@@ -17,7 +16,7 @@ from compass_ros.discovery.zero import Zero
 from compass_ros.simulation.effects import Attached, effect
 from compass_ros.simulation.sizes import unit_joint
 from compass_ros.types import Floats
-from test.discovery.planted import PUCKS, asked_of_table, model, recorded, recorded_with, response_of
+from test.discovery.planted import PUCKS, asked_of_table, recorded, response_of
 
 
 def test_of_two_laws_that_do_the_same_one_stays() -> None:
@@ -38,27 +37,6 @@ def test_of_two_laws_that_do_the_same_one_stays() -> None:
     ((left, _),) = known.models.values()
     assert len(left.laws) == 1
     assert left.zero.weakest == ()
-
-
-def test_a_fit_within_a_larger_models_begins_at_its_optimum_too() -> None:
-    """One that ended far from its optimum, as in a valley beside it, is replaced by the one from there."""
-    pull, tilt = (Attached(effect(name), PUCKS) for name in ("viscous_drag", "table_tilt"))
-    plain = response_of(recorded_with([pull, tilt], [0.1, 0.004, 0.0]))
-    simulator, wider = widened(plain.simulator, plain.likelihood, [pull, tilt])
-    everything = np.concatenate([plain.fit.free, np.arange(len(plain.likelihood.parameters), len(wider.parameters))])
-    fit = minimise(wider, start(wider, wider.prior_mean), everything, 20, 4.0)
-    larger = Hypothesis((pull, tilt), simulator, wider, fit, without=plain.fit.linear.residual)
-    stuck = model(plain, pull, [0.9])
-    beside = cost(stuck.likelihood, [stuck.fit.point], 4.0)[0][0]
-    stuck = replace(stuck, fit=replace(stuck.fit, point=replace(stuck.fit.point, cost=beside)))
-    known = Known(Prior.of(asked_of_table()), 0.0, {stuck.name: (stuck, -beside)}, {stuck.name})
-    known.begun_again(larger)
-    found, odds = known.models[stuck.name]
-    assert found.fit.point.cost < 0.5 * beside
-    assert odds > -beside
-    assert stuck.name not in known.finished
-    known.begun_again(larger)
-    assert known.models[stuck.name][0] is found
 
 
 def sites(away: Sequence[float], bars: Floats) -> tuple[list[Attached], Zero]:
