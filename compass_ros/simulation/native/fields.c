@@ -461,8 +461,8 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     if (!low[i] && !high[i]) row[i] = r, tau[i] = 1 / d->efc_KBIP[4 * r + 1];
     low[i] -= d->efc_frictionloss[r], high[i] += d->efc_frictionloss[r];
     d->efc_frictionloss[r] = 0;
+    if (d->nisland) d->iefc_frictionloss[d->map_efc2iefc[r]] = 0;   // where islands are solved, theirs is a copy
   }
-  if (d->nf) island(m, d);   // it has copied them
   for (int i = 0; i < n; i++) {
     int dof = dofs[i], own = m->M_rowadr[dof] + m->M_rownnz[dof] - 1;   // the diagonal is the last of a row
     double v = d->qvel[dof], hard = m->dof_solimp[mjNIMP * dof], longer = fmax(tau[i], m->opt.timestep);
