@@ -425,7 +425,7 @@ static void solve_small(int n, double* a, double* x) {
 // Judice and Pires 1994, which ends after two or three rounds). A soft one is MuJoCo's own constraint of frictionloss
 // (documentation, "Computation"): a + v / tau + R F = 0 with R = (1 - d) / d of the joint's inverse inertia.
 // Where there is such a law all joints' frictionloss is solved for here and none is left for MuJoCo, which would move what
-// is held: that of a joint with a law is in its limits, and holds or creeps with it; that of the others is as soft as it is.
+// is held. That of a joint with a law is in its limits, and holds or creeps with it; that of others is as soft as it is.
 // `most`: how many terms of a program are such frictions.
 static void hold(const mjModel* m, mjData* d, const Program* program, int most) {
   int nv = m->nv, n = 0, any = 0;
@@ -458,7 +458,8 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     int i = 0;
     while (i < n && dofs[i] != d->efc_id[r]) i++;
     if (i == n) dofs[n++] = d->efc_id[r], low[i] = high[i] = solved[i] = 0;
-    if (!low[i] && !high[i]) row[i] = r, tau[i] = 1 / d->efc_KBIP[4 * r + 1];
+    double damping = d->efc_KBIP[4 * r + 1];   // of 0 no speed is pulled towards zero
+    if (!low[i] && !high[i]) row[i] = r, tau[i] = damping > 0 ? 1 / damping : mjMAXVAL;
     low[i] -= d->efc_frictionloss[r], high[i] += d->efc_frictionloss[r];
     d->efc_frictionloss[r] = 0;
     if (d->nisland) d->iefc_frictionloss[d->map_efc2iefc[r]] = 0;   // where islands are solved, theirs is a copy

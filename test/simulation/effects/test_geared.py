@@ -114,10 +114,15 @@ def test_a_joints_own_friction_holds_with_a_laws(law: str, size: float) -> None:
     assert position - 0.3 > 0.03
 
 
+@pytest.mark.parametrize("last", [(0.02, 1.0), (-100.0, -20.0), (-100.0, 0.0)])
 @pytest.mark.parametrize("middle", [0.5, 4.0])
-def test_joints_beside_one_with_a_law_keep_mujocos_friction(middle: float) -> None:
-    """Three links whose middle joint has a law that is as soft as frictionloss: all move as with frictionloss alone."""
+def test_joints_beside_one_with_a_law_keep_mujocos_friction(middle: float, last: tuple[float, float]) -> None:
+    """Three links whose middle joint has a law that is as soft as frictionloss: all move as with frictionloss alone.
+
+    `last`: `solreffriction` of the last joint; without damping (0) no speed is pulled towards zero.
+    """
     model, ends = three_links(0.001), []
+    model.dof_solref[2] = last
     for given in (laws(("coulomb_friction", (middle, SOFT_S), "j1")), laws()):
         model.dof_frictionloss[:] = 8.0, 0.0 if given.effects else middle, 1.3
         data = mujoco.MjData(model)
