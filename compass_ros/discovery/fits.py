@@ -10,11 +10,13 @@ import numpy as np
 from compass_ros.calibration.cost import Point, cost, robust_loss
 from compass_ros.calibration.differences import Linear, difference_steps, extended
 from compass_ros.calibration.least_squares import minimise
+from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.residuals import typical_residual
 from compass_ros.calibration.settle import settled
 from compass_ros.discovery.evidence import solve
 from compass_ros.discovery.first_order import WIDTH, Ranked
 from compass_ros.discovery.hypothesis import Hypothesis, widened
+from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats, Ints
 
@@ -136,6 +138,17 @@ def finished(hypothesis: Hypothesis) -> Hypothesis:
 
 def without(model: Hypothesis, laws: Sequence[Attached]) -> Hypothesis:
     """The same model fitted without some of its laws."""
+    simulator, likelihood, at = lacking(model, laws)
+    point = replace(model.fit.point, values=model.fit.point.values[at], cost=np.inf)
+    free = np.flatnonzero(np.isin(at, model.fit.free))
+    linear = model.fit.linear.only(np.isin(model.fit.free, at))
+    fit = minimise(likelihood, point, free, FEW, model.fit.robust, _LAST, linear)
+    kept = tuple(attached for attached in model.laws if attached not in laws)
+    return Hypothesis(kept, simulator, likelihood, fit, without=model.bare)
+
+
+def lacking(model: Hypothesis, laws: Sequence[Attached]) -> tuple[Simulator, Likelihood, Ints]:
+    """Simulator and likelihood of a model without some of its laws, and the places of its values among the model's."""
     kept = [attached for attached in model.laws if attached not in laws]
     numbers = [np.arange(own.start, own.stop) for attached, own in model.own() if attached in kept]
     cell = len(model.simulator.cell.parameters)
@@ -150,8 +163,4 @@ def without(model: Hypothesis, laws: Sequence[Attached]) -> Hypothesis:
         prior_mean=of_all.prior_mean[at],
         prior_std=of_all.prior_std[at],
     )
-    point = replace(model.fit.point, values=model.fit.point.values[at], cost=np.inf)
-    free = np.flatnonzero(np.isin(at, model.fit.free))
-    linear = model.fit.linear.only(np.isin(model.fit.free, at))
-    fit = minimise(likelihood, point, free, FEW, model.fit.robust, _LAST, linear)
-    return Hypothesis(tuple(kept), simulator, likelihood, fit, without=model.bare)
+    return simulator, likelihood, at

@@ -16,7 +16,7 @@ from compass_ros.calibration.refine import Strongest, growing, strongest
 from compass_ros.calibration.residuals import typical_residual
 from compass_ros.discovery.discrepancy import free
 from compass_ros.discovery.first_order import WIDTH
-from compass_ros.discovery.fits import FEW, Begun, with_law
+from compass_ros.discovery.fits import FEW, Begun, lacking, with_law
 from compass_ros.discovery.hypothesis import Hypothesis, widened
 from compass_ros.discovery.response import respond
 from compass_ros.discovery.settings import PRIOR_UNKNOWN, SLIGHT
@@ -39,6 +39,8 @@ def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats
     if not starts:
         return []
     values, begun, horizons = _unbent(parent, rows)
+    if not horizons:
+        return []  # a fit to all of these episodes calls for nothing
     runners = [_runner(parent, laws, np.append(values, numbers), rows, begun, horizons)
                for laws, numbers in starts]  # fmt: skip
     alive = list(range(len(runners)))
@@ -50,13 +52,11 @@ def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats
         last = max(len(alive) // ETA, 2)
         least = found[alive[0]][1].point.cost - log(SLIGHT)
         alive = [i for k, i in enumerate(alive) if k < last or found[i][1].point.cost < least]
-    return (
-        [_at_the_end(parent, *_on_its_sites(parent, starts[i][0], rows, *found[i])) for i in alive] if horizons else []
-    )
+    return [_at_the_end(parent, *_on_its_sites(parent, starts[i][0], *found[i])) for i in alive]
 
 
 def _on_its_sites(
-    parent: Hypothesis, laws: tuple[Attached, ...], rows: Ints, likelihood: Likelihood, fit: Fit
+    parent: Hypothesis, laws: tuple[Attached, ...], likelihood: Likelihood, fit: Fit
 ) -> tuple[tuple[Attached, ...], Likelihood, Point]:
     """A law that raced on several sites without those where it may be absent, if that leaves any."""
     simulator, _ = widened(parent.simulator, parent.likelihood, laws)
@@ -64,13 +64,9 @@ def _on_its_sites(
     absent = model.zero.absent(laws) if len(laws) > 1 else ()
     if not 0 < len(absent) < len(laws):
         return laws, likelihood, fit.point
-    numbers = [own for attached, own in model.own() if attached not in absent]
-    at = np.concatenate(
-        [np.arange(len(parent.simulator.cell.parameters)), *(np.arange(n.start, n.stop) for n in numbers)]
-    )
-    kept = tuple(a for a in laws if a not in absent)
-    _, fewer = widened(parent.simulator, parent.likelihood, kept)
-    return kept, fewer.of(rows), Point(fit.point.values[at], fit.point.launch, np.inf)
+    _, fewer, at = lacking(model, absent)
+    point = replace(fit.point, values=fit.point.values[at], cost=np.inf)
+    return tuple(a for a in laws if a not in absent), fewer, point
 
 
 def _at_the_end(parent: Hypothesis, laws: tuple[Attached, ...], likelihood: Likelihood, point: Point) -> Begun:
