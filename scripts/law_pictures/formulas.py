@@ -25,8 +25,9 @@ def torque(numbers: Sequence[float], over: str = "speed", reach: float = 3.0) ->
         states = np.zeros((1, along.size, 6))
         states[0, :, 0 if over == "angle" else 2], states[..., 4] = along, 1.0
         context = Context((Site("hinge", ("joint",)),), {}, (), (), 1e-3)
-        assert law.forces is not None
-        (term,) = law.at(unit_joint("hinge")).forces(np.array([numbers]), context)  # type: ignore[misc]
+        on_hinge = law.at(unit_joint("hinge"))
+        assert on_hinge.forces is not None
+        (term,) = on_hinge.forces(np.array([numbers]), context)
         both(axes, along, 0 * along, evaluate(term, states, GRAVITY)[0, :, 0])
         labelled(axes, "speed [rad/s]" if over == "speed" else "angle [rad]", "torque [N m]")
 
