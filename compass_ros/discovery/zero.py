@@ -28,7 +28,7 @@ class Zero:
     away: Floats
     """(p,) how far each number is from where it is absent, in standard deviations of the prior."""
     errors: tuple[Floats, ...]
-    """(p, p) covariances."""
+    """(p, p) covariances: by the noise, and by what the episodes disagree on."""
 
     @property
     def weakest(self) -> tuple[Attached, ...]:
@@ -46,9 +46,15 @@ class Zero:
         return self._nearest([[a] for a in own if count[a.effect.name] > 1])
 
     def absent(self, laws: Sequence[Attached]) -> tuple[Attached, ...]:
-        """Of some laws the most that may all be zero together, those that lie nearest to it."""
-        order = sorted(laws, key=lambda a: self._distance([a])[0])
-        return next((tuple(order[:n]) for n in range(len(order), 0, -1) if self.may_lack(order[:n])), ())
+        """Of some laws the most that may all be zero together, those that lie nearest to it. By the noise alone: a site
+        that one of a few episodes shows is for the evidence to keep or to drop."""
+        noise = replace(self, errors=self.errors[:1])
+        order = noise.nearest_first(laws)
+        return next((tuple(order[:n]) for n in range(len(order), 0, -1) if noise.may_lack(order[:n])), ())
+
+    def nearest_first(self, laws: Sequence[Attached]) -> list[Attached]:
+        """Laws by how far each alone is from zero in its error bars."""
+        return sorted(laws, key=lambda a: self._distance([a])[0])
 
     def may_lack(self, laws: Sequence[Attached]) -> bool:
         """Whether zero is in the region of that confidence of all amplitudes of some laws together. Of two that do

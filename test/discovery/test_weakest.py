@@ -39,11 +39,11 @@ def test_of_two_laws_that_do_the_same_one_stays() -> None:
     assert left.zero.weakest == ()
 
 
-def sites(away: Sequence[float], bars: Floats) -> tuple[list[Attached], Zero]:
-    """Coulomb friction on as many joints, each with a size, and which of them may be zero."""
+def sites(away: Sequence[float], bars: Floats, episodes: Floats | None = None) -> tuple[list[Attached], Zero]:
+    """Coulomb friction on as many joints, each with a size, and which may be zero by the noise and by the episodes."""
     own = [Attached(effect("coulomb_friction").at(unit_joint("hinge")), (f"j{i}",)) for i in range(len(away))]
     at = tuple((a, np.array([i])) for i, a in enumerate(own))
-    return own, Zero(at, np.array(away), (bars, np.zeros_like(bars)))
+    return own, Zero(at, np.array(away), (bars, np.zeros_like(bars) if episodes is None else episodes))
 
 
 def test_a_law_that_raced_on_all_joints_stays_where_it_is() -> None:
@@ -51,6 +51,13 @@ def test_a_law_that_raced_on_all_joints_stays_where_it_is() -> None:
     assert set(zero.absent(own)) == set(own[1:])
     assert zero.weakest == ()
     assert zero.weakest_site == (own[1],)
+
+
+def test_a_site_that_only_some_episodes_show_stays_for_the_evidence() -> None:
+    """It is beyond the noise; that the episodes leave it open makes the law one that may be zero, and drops no site."""
+    own, zero = sites([5.0, 4.0, 0.1], np.eye(3), episodes=np.diag([100.0, 100.0, 0.1]))
+    assert zero.absent(own) == (own[2],)
+    assert set(zero.weakest) == set(own)
 
 
 def test_many_sites_that_are_each_small_may_not_all_be_zero_together() -> None:
