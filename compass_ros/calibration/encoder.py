@@ -31,6 +31,11 @@ _GROWTH = 4.0
 """By how much the range of differences grows from one refinement of the step to the next."""
 
 
+_SINGLE = 20 * float(np.finfo(np.float32).eps)
+"""The finest step over the largest value: messages and tables often have single precision, whose rounding makes second
+differences of up to two such units; a tenth of the finest step must be more."""
+
+
 def encoder_step(series: Sequence[Floats], finest: float) -> float:
     """The greatest common spacing of the values of one signal, 0 where there is none of `finest` or more.
 
@@ -39,6 +44,7 @@ def encoder_step(series: Sequence[Floats], finest: float) -> float:
         finest: The least step that is looked for [the same unit].
     """
     seen = [one[~np.isnan(one)] for one in series]
+    finest = max(finest, _SINGLE * max((float(np.abs(one).max()) for one in seen if len(one)), default=0.0))
     change = np.abs(np.concatenate([np.diff(one, 2) for one in seen] or [np.zeros(0)]))  # small where it is fast too
     moved = np.sort(change[change > 0.1 * finest])
     if len(moved) < _FEWEST:

@@ -63,6 +63,14 @@ def test_the_step_is_found(motion: str, step: float, noise: float) -> None:
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("turns", [0, 10])
+def test_a_step_in_single_precision_is_found(motion: str, turns: int) -> None:
+    """Degrees, computed from radians of 24 bits: their rounding is far coarser than the finest step that is asked."""
+    said = [np.degrees(np.float32(x + 2 * np.pi * turns).astype(float)) for x in recorded(motion, 2 * np.pi / 4096)]
+    assert encoder_step(said, 1e-6) == pytest.approx(360 / 4096, rel=1e-3)
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("noise", [0.0, 1e-5, 1e-3])
 def test_there_is_none_where_nothing_counts(motion: str, noise: float) -> None:
     rng = np.random.default_rng(1)
