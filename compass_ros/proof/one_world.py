@@ -19,8 +19,8 @@ from compass_ros.proof.marks import judge
 from compass_ros.reporting import read_result
 from compass_ros.worlds.scenes import MODULES
 
-LIMIT_S = 1800
-"""A calibration that takes longer counts as failed [s]."""
+LIMIT_S = 3600
+"""A calibration that takes longer counts as failed [s]: beside others 1041 s were needed on a machine twice as fast as some."""
 
 
 @dataclass(frozen=True)
