@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rich import box
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -15,6 +14,7 @@ from compass_ros.checks.check import Checked
 from compass_ros.checks.figures import Figures
 from compass_ros.checks.finding import Finding, Severity
 from compass_ros.reporting.numbers import MISSING, percent, plain
+from compass_ros.reporting.table import NARROW
 from compass_ros.types import LeftOut
 
 STYLE: Mapping[Severity, str] = {"bad": "bold red", "repaired": "bold green", "note": "bold yellow"}
@@ -42,14 +42,19 @@ def _many(count: int) -> str:
 
 
 def _table(rows: Sequence[Figures]) -> Table:
-    table = Table(box=box.MINIMAL_HEAVY_HEAD, pad_edge=False, show_edge=False)
-    table.add_column("signal", overflow="fold")
+    """What all rows share, one signal's name or a unit, is said once, at the head: names of joints fit then."""
+    table = Table(**NARROW)
+    heads, units = {row.signal.partition(".")[0] for row in rows}, {row.unit for row in rows}
+    of_one = len(heads) == 1 and all("." in row.signal for row in rows)
+    unit = f" [m{min(units)}]" if len(units) == 1 and any(units) else ""
+    table.add_column(Text(f"{min(heads) if of_one else 'signal'}{unit}"), overflow="fold")
     for heading in ("Hz", "gaps", "noise", "step", "still", "stuck", "used", "delay"):
         table.add_column(Text(heading), justify="right", no_wrap=True)
     for row in rows:
         delay = f"{plain(1e3 * row.delay_s, 3)} ms" if math.isfinite(row.delay_s) else MISSING
+        name = row.signal.partition(".")[2] if of_one else row.signal
         table.add_row(
-            Text(f"{row.signal} [m{row.unit}]" if row.unit else row.signal),
+            Text(f"{name} [m{row.unit}]" if row.unit and not unit else name),
             plain(row.rate_hz, 3),
             str(row.gaps),
             _thousandths(row.noise, row.unit),
