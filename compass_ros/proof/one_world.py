@@ -20,7 +20,7 @@ from compass_ros.reporting import read_result
 from compass_ros.worlds.scenes import MODULES
 
 LIMIT_S = 3600
-"""A calibration that takes longer counts as failed [s]: up to 1041 s were needed, and some machines are half as fast."""
+"""A calibration that takes longer counts as failed [s]: up to 1041 s were needed, some machines are half as fast."""
 
 
 @dataclass(frozen=True)
