@@ -16,6 +16,7 @@ from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery, data_bad, discover, fit_failed, not_evaluated
 from compass_ros.errors import DataError
 from compass_ros.estimation import estimate_parameters
+from compass_ros.planning.next_experiment import with_next
 from compass_ros.posing import Posed
 from compass_ros.progress import Steady
 from compass_ros.selection import evenly, split, unlike
@@ -107,7 +108,8 @@ def searched(
     """What is missing, or why that cannot be said: the calibration stands either way."""
     try:
         refined = refined or refine(posed.problem.likelihood, estimate.values)
-        return discover(posed.simulator, refined, posed.unseen, posed.noise, config.false_alarm, config.seed, report)
+        found = discover(posed.simulator, refined, posed.unseen, posed.noise, config.false_alarm, config.seed, report)
+        return with_next(found, posed.simulator, config.seed)
     except DataError as error:
         return not_evaluated(str(error))
     except np.linalg.LinAlgError as error:

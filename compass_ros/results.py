@@ -16,6 +16,7 @@ from compass_ros.discovery import Discovery
 from compass_ros.discovery.maps import TableMap
 from compass_ros.errors import ConfigError
 from compass_ros.reporting import Candidate, ReportExtras, ResidualMap, Scene, Shape, write_report, write_result
+from compass_ros.reporting.atomic import write_text
 from compass_ros.reporting.kept import RESULT, TRAJECTORIES, write_trajectories
 from compass_ros.simulation.export import write_effects_of, write_scene
 from compass_ros.types import Result
@@ -42,6 +43,8 @@ def write_all(
     )
     if cell.path != cells_folder() / f"{cell.name}.yaml":
         result = replace(result, cell_file=os.path.relpath(cell.path, out))
+    for name, text in found.files.items():
+        write_text(out / name, text)
     write_report(result, out / REPORT, extras)
     write_trajectories(result, out / TRAJECTORIES, extras)
     write_result(result, out / RESULT)

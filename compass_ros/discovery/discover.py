@@ -91,7 +91,7 @@ def weigh(
         if simulator.cell.time_step is None and (step := shorter_step(plain, best, threshold)):
             return fit_failed(f"what is left goes away with time steps of {1e3 * step:g} ms", step)
     tell("weigh effects", 0.95)
-    said = Judge(found, held_out, noise, alpha, threshold, odds, undetectable(first), seed, warnings).discovery()
+    said = Judge(found, held_out, noise, alpha, threshold, odds, undetectable(first), warnings).discovery()
     if said.mismatch.verdict != "none":
         return said
     return replace(said, open_sigma=left_open(simulator, refined, held_out, seed))

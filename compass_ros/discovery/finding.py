@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from compass_ros.calibration.launches import with_launches
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.cells import Cell
+from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.maps import TableMap
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import rms_distance
@@ -67,6 +68,10 @@ class Discovery:
     """What the parameters' error bars leave open in held-out episodes, over the noise."""
     shorter_s: float | None = None
     """A time step [s] with which the simulator explains more as it is than with any law or discrepancy."""
+    rivals: tuple[Hypothesis, ...] = ()
+    """The models between which an ambiguous verdict leaves the choice."""
+    files: Mapping[str, str] = field(default_factory=dict)
+    """By name, what a robot needs for the next experiment."""
 
 
 def not_evaluated(reason: str) -> Discovery:

@@ -13,7 +13,6 @@ from compass_ros.discovery.finding import Discovery, Tried, Weighed, held_out_er
 from compass_ros.discovery.floor import TWICE, shown_noise
 from compass_ros.discovery.hypothesis import Hypothesis, name_of
 from compass_ros.discovery.maps import table_map
-from compass_ros.discovery.next_shot import next_experiment
 from compass_ros.discovery.numerics import with_numerics
 from compass_ros.discovery.search import Found
 from compass_ros.discovery.settings import SLIGHT
@@ -55,7 +54,6 @@ class Judge:
     odds: Floats
     """Largest ones in recordings simulated from the plain model."""
     undetectable: tuple[str, ...]
-    seed: int
     warnings: tuple[str, ...]
     opened: dict[str, float] = field(default_factory=dict)
     """Held-out errors by name of the model, as they become known."""
@@ -149,21 +147,20 @@ class Judge:
         )
         numbers = [values[own] for attached, own in best.own() if attached in best.physics]
         where = where_of(best.physics, numbers[0], self.simulator.movers())
-        following = ""
         lacks = missing(best.physics, numbers, self.simulator.places)
         if verdict == "ambiguous":
-            following = next_experiment(self.simulator, best.likelihood, models, self.seed).sentence
             lacks = "the simulator lacks one of these: " + "; ".join(dict.fromkeys(name_of(m.physics) for m in models))
         names = [a.effect.name for a in best.physics]
         sizes = "; ".join(
             value_of(f, a, names.count(a.effect.name) > 1) for f, a in zip(findings, best.physics, strict=True)
         )
         sizes += corrected(best.corrections)
-        said = errors(self._before, after, self._floor, self.simulator.unit)
-        sentence = f"{place(where, self._flat)}, {lacks}; {sizes}; {said}."
+        gaps = errors(self._before, after, self._floor, self.simulator.unit)
+        sentence = f"{place(where, self._flat)}, {lacks}; {sizes}; {gaps}."
         law = best.physics[0]
         sites = self.simulator.places.sites(law.objects, law.effect.on)
-        return self._said(verdict, sentence, _on(where, sites, law.objects), findings, following, best)
+        said = self._said(verdict, sentence, _on(where, sites, law.objects), findings, best)
+        return replace(said, rivals=tuple(models)) if verdict == "ambiguous" else said
 
     def _said(
         self,
@@ -171,12 +168,9 @@ class Judge:
         sentence: str,
         where: Where | None = None,
         findings: tuple[EffectFinding, ...] = (),
-        following: str = "",
         best: Hypothesis | None = None,
     ) -> Discovery:
-        mismatch = Mismatch(
-            verdict, where, findings, self.undetectable, following, sentence, self._explanations(), self.alpha
-        )
+        mismatch = Mismatch(verdict, where, findings, self.undetectable, "", sentence, self._explanations(), self.alpha)
         tried = self._tried(best)
         plain, cell = self.found.plain, len(self.simulator.cell.parameters)
         before = table_map(plain.response, plain.free.pushes)

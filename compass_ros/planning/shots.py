@@ -11,11 +11,11 @@ from compass_ros.cells import Cell
 from compass_ros.config import read_yaml
 from compass_ros.discovery.candidates import candidates
 from compass_ros.discovery.objections import objections
-from compass_ros.discovery.planned import completed, draw, linearised
 from compass_ros.errors import ConfigError, nearest, shown
 from compass_ros.planning.exchange import choose
 from compass_ros.planning.information import information
 from compass_ros.planning.plan import Plan, plan_of, widest
+from compass_ros.planning.planned import completed, draw, linearised
 from compass_ros.simulation import Simulator
 from compass_ros.types import Floats
 

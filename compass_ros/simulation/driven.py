@@ -173,12 +173,20 @@ def virtual_recordings(
     They begin in (B, D) postures, the first command having been held for SETTLED_S. Noise and steps of the signals are
     those that the cell states.
     """
+    (seen,) = played(simulator, driven, values[None], time_s, series, posture)
+    cell, spec = simulator.cell, driven.spec
+    return [_episode(cell, spec, i, time_s, own, _measured(cell, seen[i], rng)) for i, own in enumerate(series)]
+
+
+def played(
+    simulator: Simulator, driven: Driven, values: Floats, time_s: Floats, series: Floats, posture: Floats
+) -> Floats:
+    """(N, B, F, C) signals of B motions at (N, P) values, without noise; motions as in `virtual_recordings`."""
     player = simulator.driven([_drive(driven, time_s, own) for own in series])
     inputs = player.inputs(_inputs(player.cell, driven, posture))
-    seen_at = np.tile(driven.settled_s + time_s, (len(series), 1))
-    seen = player.observe(np.tile(values, (len(series), 1)), inputs, seen_at)
-    cell, spec = player.cell, driven.spec
-    return [_episode(cell, spec, i, time_s, own, _measured(cell, seen[i], rng)) for i, own in enumerate(series)]
+    seen_at = np.tile(driven.settled_s + time_s, (len(values) * len(series), 1))
+    seen = player.observe(np.repeat(values, len(series), axis=0), np.tile(inputs, (len(values), 1)), seen_at)
+    return np.asarray(seen.reshape(len(values), len(series), *seen.shape[1:]))
 
 
 def _drive(driven: Driven, time_s: Floats, series: Floats) -> Drive:

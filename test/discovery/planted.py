@@ -14,8 +14,8 @@ from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.candidates import Candidate, candidates
 from compass_ros.discovery.hypothesis import Hypothesis, widened
-from compass_ros.discovery.planned import perfect
 from compass_ros.discovery.response import Response, respond
+from compass_ros.planning.planned import perfect
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats
 from test.simulation.table import cell, simulator

@@ -19,8 +19,8 @@ from compass_ros.discovery.evidence import Tangent, evidences
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.nuisances import finite_step, nuisances, stated_errors
 from compass_ros.discovery.numerics import numerics_as_model, shorter_step
-from compass_ros.discovery.planned import perfect
 from compass_ros.discovery.response import Response
+from compass_ros.planning.planned import perfect
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.simulation.manifold import apart, charted

@@ -16,10 +16,10 @@ from compass_ros.cells import load
 from compass_ros.cells.drives import Drive
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.hypothesis import widened
-from compass_ros.discovery.planned import perfect
 from compass_ros.discovery.response import respond
 from compass_ros.planning.information import information
 from compass_ros.planning.plan import cosines
+from compass_ros.planning.planned import perfect
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
 from compass_ros.types import Floats

@@ -13,8 +13,8 @@ from compass_ros.calibration.differences import linearise
 from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.cells import Cell
-from compass_ros.discovery.planned import perfect
 from compass_ros.discovery.response import Response, respond
+from compass_ros.planning.planned import perfect
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compass_ros.discovery.hypothesis import Hypothesis
-from compass_ros.discovery.next_shot import NextExperiment, next_experiment
+from compass_ros.planning.next_experiment import NextExperiment, next_experiment
 from compass_ros.simulation.effects import EFFECTS, Attached
 from test.discovery.planted import PUCKS, model, planned_response
 from test.simulation.table import cell, simulator
@@ -18,7 +18,7 @@ def rival(name: str, *numbers: float) -> Hypothesis:
 
 
 def ask(*rivals: Hypothesis) -> NextExperiment:
-    return next_experiment(simulator(), planned_response().likelihood, rivals, seed=0, pool=8)
+    return next_experiment(simulator(), rivals, seed=0, count=8)
 
 
 @pytest.fixture(scope="module")
@@ -74,4 +74,4 @@ def test_of_three_models_the_pair_that_stays_is_named(forces: tuple[Hypothesis, 
 
 
 def test_one_model_needs_no_experiment(forces: tuple[Hypothesis, Hypothesis]) -> None:
-    assert ask(forces[0]) == NextExperiment("", None, 0.0)
+    assert ask(forces[0]) == NextExperiment("")

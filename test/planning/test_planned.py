@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from compass_ros.cells import load
-from compass_ros.discovery.planned import completed, draw, linearised, within_stroke, worth
 from compass_ros.errors import ConfigError
+from compass_ros.planning.planned import completed, draw, linearised, within_stroke, worth
 from test.discovery.planted import CALM
 from test.simulation.table import cell, simulator
 

@@ -1,0 +1,123 @@
+"""The next experiment: where explanations that are open so far predict most differently.
+
+A model's prediction of a new recording is uncertain, since its parameters are; draws from its posterior say how much,
+chaos included. The difference of two models counts after each has been refitted to first order, that is without the
+part that such draws could make up (T-optimal design; Atkinson and Fedorov 1975).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+
+import numpy as np
+
+from compass_ros.calibration.least_squares import normal_equations
+from compass_ros.discovery import Discovery
+from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.planning.other_measurements import between, of_unknown
+from compass_ros.planning.trials import Trials, trials
+from compass_ros.simulation import Simulator
+from compass_ros.simulation.sites import PLANAR
+from compass_ros.types import Floats
+
+DRAWS = 6
+TOLD = 5.0
+"""Difference [sigma] at which two models are told apart. The verdict's evidence lets the form of a law be wrong, so it
+rises by less than half of its square: by 4 and 8 where two kinds of drag differ by 6.4 (test_next_motion.py), and 3 is
+what a choice between two needs."""
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """What to record next."""
+
+    sentence: str
+    action: Mapping[str, float] | None = None
+    """The shot by name of its fields; None where it is a motion, or no shot helps."""
+    apart: float = 0.0
+    """Least difference of the models that it tells apart [sigma]; 0 where it is neither shot nor motion."""
+    files: Mapping[str, str] = field(default_factory=dict)
+    """By name, what a robot needs to do it."""
+
+
+def with_next(found: Discovery, simulator: Simulator, seed: int) -> Discovery:
+    """A verdict that leaves something open, with what would settle it. `simulator`: without laws."""
+    mismatch = found.mismatch
+    following = NextExperiment("")
+    if mismatch.verdict == "ambiguous":
+        following = next_experiment(simulator, found.rivals, seed)
+    elif mismatch.verdict == "unknown" and mismatch.where is not None:
+        advice = of_unknown(mismatch.where.channel, _flat(simulator))
+        following = NextExperiment(f"To see what it depends on, {advice}.")
+    if not following.sentence:
+        return found
+    return replace(found, mismatch=replace(mismatch, next_experiment=following.sentence), files=following.files)
+
+
+def next_experiment(simulator: Simulator, rivals: Sequence[Hypothesis], seed: int, count: int = 0) -> NextExperiment:
+    """The shot or motion that tells most pairs of rival models apart, and by most; or what is neither.
+
+    `simulator`: without laws; the sigma is that of the rivals' recordings. `count`: how many are tried, 0: as many as
+    `trials` says.
+    """
+    pairs = list(combinations(range(len(rivals)), 2))
+    if not pairs:
+        return NextExperiment("")
+    flat = _flat(simulator)
+    tried = trials(simulator, rivals[0].likelihood, seed, count)
+    if tried is None:
+        return NextExperiment(_other(rivals, pairs, "recording of this kind", flat))
+    rng = np.random.default_rng(seed)
+    predicted = [_predictions(rival, tried, rng) for rival in rivals]
+    apart = np.array([_apart(predicted[a], predicted[b]) for a, b in pairs])  # (pairs, S)
+    told = np.sum(apart > TOLD, axis=0)
+    least = np.min(np.where(apart > TOLD, apart, np.inf), axis=0)
+    best = int(np.lexsort((np.where(told > 0, least, apart.max(axis=0)), told))[-1])
+    if not told[best]:
+        return NextExperiment(_other(rivals, pairs, tried.word, flat))
+    said = [
+        f"{rivals[a].name} from {rivals[b].name} by {d:.0f} sigma"
+        for (a, b), d in zip(pairs, apart[:, best], strict=True) if d > TOLD
+    ]  # fmt: skip
+    sentence = f"{tried.ask(best)}: it tells {', '.join(said)}."
+    if left := [pair for pair, d in zip(pairs, apart[:, best], strict=True) if d <= TOLD]:
+        sentence += " " + _other(rivals, left, tried.word, flat)
+    return NextExperiment(sentence, tried.action(best), float(least[best]), tried.files(best))
+
+
+def _predictions(rival: Hypothesis, tried: Trials, rng: np.random.Generator) -> Floats:
+    """(1 + DRAWS, S, D) predictions [sigma] at the best values, and at draws from the posterior."""
+    fit, likelihood = rival.fit, rival.likelihood
+    hessian, _ = normal_equations(likelihood, fit.point, fit.linear, fit.free, fit.robust)
+    p = len(fit.free)
+    factor = np.linalg.cholesky(np.linalg.inv(hessian)[:p, :p] * likelihood.correlation_time)
+    values = np.tile(fit.point.values, (1 + DRAWS, 1))
+    values[1:, fit.free] += rng.normal(size=(DRAWS, p)) @ factor.T * likelihood.prior_std[fit.free]
+    return tried.predicted(rival.simulator, np.clip(values, likelihood.low, likelihood.high))
+
+
+def _apart(one: Floats, other: Floats) -> Floats:
+    """(S,) difference of two models in sigma, without what the posteriors of both could make up."""
+    difference = one[0] - other[0]
+    spread = np.concatenate([one[1:] - one[0], other[1:] - other[0]]) / np.sqrt(DRAWS)  # (2 DRAWS, S, D)
+    out = np.empty(len(difference))
+    for s, d in enumerate(difference):
+        u = spread[:, s]
+        pull = u @ d
+        out[s] = d @ d - pull @ np.linalg.solve(u @ u.T + np.eye(len(u)), pull)
+    return np.asarray(np.sqrt(np.maximum(out, 0.0)))
+
+
+def _other(rivals: Sequence[Hypothesis], pairs: Sequence[tuple[int, int]], word: str, flat: bool) -> str:
+    names = [frozenset(a.effect.name for a in rival.laws) for rival in rivals]
+    return " ".join(
+        f"No {word} tells {rivals[a].name} from {rivals[b].name}: {between(names[a], names[b], flat)}."
+        for a, b in pairs
+    )
+
+
+def _flat(simulator: Simulator) -> bool:
+    """Whether something that is tracked slides in a plane."""
+    return any(site.kind in PLANAR for site in simulator.moving.values())
