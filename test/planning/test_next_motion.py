@@ -1,4 +1,4 @@
-"""The next motion of a driven joint: within what it has done, where two laws differ most, so that it says which it is."""
+"""The next motion of a driven joint: within what it has done, where two laws differ most; it says which it is."""
 
 from __future__ import annotations
 
