@@ -7,6 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from _pytest.mark.structures import ParameterSet
 
 from compass_ros.config import calibration_config
 from compass_ros.pipeline import calibrate
@@ -19,6 +20,10 @@ pytestmark = pytest.mark.slow
 CONFIG = calibration_config({"discover": False, "threads": 1})
 
 
+def _nightly(*cases: tuple[str, int]) -> list[ParameterSet]:
+    return [pytest.param(*case, marks=pytest.mark.nightly) for case in cases]
+
+
 def calibrated(robot: str, seed: int, episodes: list[Episode], folder: Path) -> Result:
     return calibrate(episodes, cell(robot, folder, seed), CONFIG)[0]
 
@@ -29,7 +34,8 @@ def true_damping(robot: str, seed: int) -> float:
 
 
 @pytest.mark.parametrize(
-    ("robot", "seed"), [("pendulum", 0), ("pendulum", 1), ("rotor", 0), ("rotor", 1), ("rotor", 2)]
+    ("robot", "seed"),
+    [("pendulum", 0), ("rotor", 0), *_nightly(("pendulum", 1), ("rotor", 1), ("rotor", 2))],
 )
 def test_wrapped_angles_give_what_plain_ones_give(robot: str, seed: int, tmp_path: Path) -> None:
     clean = record(robot, seed)
@@ -50,7 +56,8 @@ def _turned(episodes: list[Episode]) -> list[Episode]:
 
 
 @pytest.mark.parametrize(
-    ("robot", "seed"), [("pendulum", 0), ("pendulum", 1), ("rotor", 0), ("slider", 0), ("slider", 1)]
+    ("robot", "seed"),
+    [("pendulum", 0), ("slider", 0), *_nightly(("pendulum", 1), ("rotor", 0), ("slider", 1))],
 )
 def test_what_begins_late_gives_what_begins_in_time_gives(robot: str, seed: int, tmp_path: Path) -> None:
     found = calibrated(robot, seed, faults.begins_late(record(robot, seed), np.random.default_rng(0)), tmp_path)
