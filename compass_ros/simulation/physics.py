@@ -18,6 +18,7 @@ from compass_ros.cells.start import input_names, positions_in_state
 from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.effect import Context, Sample, restore, table_friction
 from compass_ros.simulation.native.program import Term
+from compass_ros.simulation.sensing import link, through
 from compass_ros.simulation.sites import Places, Site, SiteKind
 from compass_ros.types import Bools, Floats, Ints, Parameter
 
@@ -202,11 +203,11 @@ class Physics:
 
     def _through(self, laws: Sequence[Acting], values: Floats, sample: Sample) -> Sample:
         """What sensors with some laws make of what perfect ones say."""
+        links = []
         for attached, numbers, sites in laws:
-            if attached.effect.sensing is not None:
-                sensed = attached.effect.sensing(sample, numbers, self.context(sites, values))
-                sample = _where(self._of_signals(sites), sensed, sample)
-        return sample
+            if (law := attached.effect.sensing) is not None:
+                links.append((self._of_signals(sites), link(law, numbers, self.context(sites, values))))
+        return through(links, sample)
 
     def _of_signals(self, sites: tuple[Site, ...]) -> Bools:
         """(C,) which columns of an observation belong to some signals."""
@@ -241,13 +242,6 @@ def _measured(cell: Cell, model: mujoco.MjModel) -> Iterator[Site]:
             if len(columns) > 1:
                 name = f"{signal.name}.{number}"
                 yield Site(kind, (name,), columns=(column,), quantity=signal.quantity, units=(unit,))
-
-
-def _where(columns: Bools, sensed: Sample, before: Sample) -> Sample:
-    """What one sensor says in its columns, and in the others what was said before."""
-    if columns.all():
-        return sensed
-    return lambda time: np.where(columns, sensed(time), before(time))
 
 
 def interpolate(
