@@ -372,11 +372,14 @@ class Simulator:
         """(B, T + 1, n) the given places of (qpos, qvel, act, sensordata), the start first."""
         start, controls, steps = self.begun(values, inputs, duration)
         states, sensors = self.play(values, start, controls, steps)
-        if self.physics.model.nsensordata:
-            rows = np.concatenate([start[:, None], states[:, :-1]], axis=1)
-            return np.asarray(np.concatenate([rows, sensors], axis=2)[:, :, 1 + columns])
-        seen = np.empty((len(start), steps + 1, len(columns)))
-        seen[:, 0], seen[:, 1:] = start[:, 1 + columns], states[:, :, span(1 + columns)]
+        places, size = 1 + columns, start.shape[1]
+        if not self.physics.model.nsensordata:
+            seen = np.empty((len(start), steps + 1, len(places)))
+            seen[:, 0], seen[:, 1:] = start[:, places], states[:, :, span(places)]
+            return seen
+        seen, sensed = np.empty((len(start), steps, len(places))), places >= size
+        seen[:, 0, ~sensed], seen[:, 1:, ~sensed] = start[:, places[~sensed]], states[:, :-1, span(places[~sensed])]
+        seen[:, :, sensed] = sensors[:, :, span(places[sensed] - size)]
         return seen
 
     def _steps(self, duration: float) -> int:
