@@ -134,13 +134,12 @@ class Driving:
 
 
 def _motions(simulator: Simulator, likelihood: Likelihood, sigma: Floats, seed: int, count: int) -> Driving | None:
-    """Within the scene's ranges and the speeds that the joints have reached in the recordings."""
+    """Within the scene's ranges, else the places, and the speeds that the joints have reached in the recordings."""
     try:
-        driven = driven_joints(simulator)
-        within = limits(driven, 1.0)
+        driven, speed = _reached(simulator, likelihood, driven_joints(simulator))
+        within = replace(limits(driven, 1.0), speed=speed)
     except ConfigError:
         return None  # measured inputs, wrenches, forces without a limit: nobody can say what may be played
-    within = replace(within, speed=_speeds(simulator, likelihood, driven))
     spec = simulator.cell.spec.windows
     seconds = simulator.cell.duration if spec is None else spec.length_s
     numbers = np.random.default_rng([seed, 29]).normal(size=(count, size(driven)))
@@ -157,14 +156,25 @@ def _motions(simulator: Simulator, likelihood: Likelihood, sigma: Floats, seed: 
     )
 
 
-def _speeds(simulator: Simulator, likelihood: Likelihood, driven: Driven) -> Floats:
-    """(D,) largest speed of each joint in the recordings [rad/s or m/s]; of one that is not measured, the least."""
+def _reached(simulator: Simulator, likelihood: Likelihood, driven: Driven) -> tuple[Driven, Floats]:
+    """The same joints, between the places that they were at where the scene gives no range, and (D,) the largest speed
+    of each [rad/s or m/s]; one that was not measured has the least of the others', at most 1."""
     frames = max(round(_ACROSS_S / float(np.nanmedian(np.diff(likelihood.time_s)))), 1)
     apart = likelihood.time_s[:, frames:] - likelihood.time_s[:, :-frames]
     moved = np.abs(likelihood.measured[:, frames:] - likelihood.measured[:, :-frames]) / apart[:, :, None]
-    out = np.full(len(driven.joints), np.nan)
+    low, high, home, speed = (
+        driven.low.copy(),
+        driven.high.copy(),
+        driven.home.copy(),
+        np.full(len(driven.home), np.nan),
+    )
     for signal in (s for s in simulator.cell.signals if s.quantity == "joint_position"):
-        for column, joint in enumerate(signal.at):
-            if joint in driven.joints:
-                out[driven.joints.index(joint)] = np.nanmax(moved[:, :, signal.first + column])
-    return np.where(np.isnan(out), np.nanmin(out, initial=1.0), out)
+        for column, joint in enumerate(signal.at, signal.first):
+            places = likelihood.measured[:, :, column]
+            if joint in driven.joints and not np.isnan(places).all():
+                i = driven.joints.index(joint)
+                speed[i] = np.nanmax(moved[:, :, column])
+                if joint in driven.without_range:
+                    low[i], high[i] = np.nanmin(places), np.nanmax(places)
+                    home[i] = home[i] if low[i] < home[i] < high[i] else 0.5 * (low[i] + high[i])
+    return replace(driven, low=low, high=high, home=home), np.where(np.isnan(speed), np.nanmin([*speed, 1.0]), speed)
