@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from compass_ros.cells import Cell
     from compass_ros.concealed.world import Wishes
-    from compass_ros.types import Episode
+    from compass_ros.types import Episode, Floats
     from compass_ros.worlds.world import Asked
 
 ANSWERS = Path("~/.local/share/compass_ros/answers")
@@ -41,6 +41,10 @@ def conceal(
         Literal["none", "one", "two", "outside"] | None, typer.Option(help="how much is missing; else drawn")
     ] = None,
     effect: Annotated[list[str] | None, typer.Option(help="the missing physics by name, once or twice")] = None,
+    commands: Annotated[
+        Path | None,
+        typer.Option(help="worlds of other engines: the same world told this, next_shot.yaml or next_motion.csv"),
+    ] = None,
 ) -> None:
     """Make recordings of a concealed cell; write the bags, and seal what is wrong with it."""
     from compass_ros.cells import load
@@ -50,17 +54,33 @@ def conceal(
     from compass_ros.worlds.world import Asked
 
     names, loaded = tuple(effect or ()), load(cell)
+    foreign = Asked(seed, kind, names, _read(commands, loaded) if commands else None)
     if forms == "foreign" and loaded.name in TABLES:
         if (noise, rms) != ("white", None):
             raise ConfigError(f"{cell}: --noise and --rms are not of --forms foreign")
-        path = write_world(cell, Asked(seed, kind, names), out, answers)
+        path = write_world(cell, foreign, out, answers)
     elif loaded.spec.dynamics != "air_hockey" or forms == "foreign":
         if (noise, rms, forms) != ("white", None, "other"):
             raise ConfigError(f"{cell}: --noise, --rms and --forms are of the cell air_hockey alone")
-        path = write_world(cell, Asked(seed, kind, names), out, answers)
+        path = write_world(cell, foreign, out, answers)
+    elif commands is not None:
+        raise ConfigError(f"{cell}: --commands are of --forms foreign")
     else:
         path = write(cell, Wishes(seed, noise, rms, forms, kind, names), out, answers)
     typer.echo(f"{out}: recordings and the seal; the answer is in {path.parent}")
+
+
+def _read(file: Path, cell: Cell) -> Floats:
+    from compass_ros.errors import ConfigError
+    from compass_ros.planning.motion_table import read_commands
+    from compass_ros.planning.shots import read_shots
+    from compass_ros.worlds.scenes import COMMANDED
+
+    if cell.name not in COMMANDED:
+        raise ConfigError(
+            f"{cell.name}: --commands: its worlds are told nothing; those that are: {', '.join(COMMANDED)}"
+        )
+    return read_commands(file, cell) if cell.spec.inputs else read_shots(file, cell)
 
 
 def write(cell_name: str, wishes: Wishes, out: Path, answers: Path) -> Path:

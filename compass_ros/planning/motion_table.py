@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import csv
 import io
+from pathlib import Path
 
+import numpy as np
 import yaml
 
 from compass_ros.cells import Cell
 from compass_ros.cells.series import OF_JOINTS
 from compass_ros.cells.signals import Signal
+from compass_ros.errors import ConfigError
 from compass_ros.planning.excitation import Proposal
+from compass_ros.types import Floats
 
 DIGITS = 6
 """After the point, of a number of the input: a micrometre, a microradian."""
@@ -47,6 +51,22 @@ def import_config(cell: Cell, proposal: Proposal, file: str) -> str:
         "inputs": {spec.name: driven | ({"topic": spec.topic} if spec.topic else {})},
     }
     return yaml.safe_dump(content, sort_keys=False, width=120, default_flow_style=None)
+
+
+def read_commands(path: Path, cell: Cell) -> Floats:
+    """(E, n, D) numbers of the one input of a cell in such a table. Raises ConfigError where it is none."""
+    (spec,) = cell.spec.inputs
+    names = [f"{spec.name}.{name}" for name in spec.of]
+    motions: dict[str, list[list[float]]] = {}
+    try:
+        with path.open(encoding="utf-8", newline="") as lines:
+            for row in csv.DictReader(lines):
+                motions.setdefault(row["motion"], []).append([float(row[name]) for name in names])
+    except (OSError, KeyError, ValueError) as error:
+        raise ConfigError(f"{path}: expected columns motion, {', '.join(names)}: {error}") from error
+    if len({len(rows) for rows in motions.values()}) != 1:
+        raise ConfigError(f"{path}: expected motions of one length, found {[len(r) for r in motions.values()]}")
+    return np.array([*motions.values()])
 
 
 def _input_columns(proposal: Proposal) -> list[str]:

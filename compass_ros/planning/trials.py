@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+import yaml
 
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.errors import ConfigError
@@ -26,7 +27,7 @@ _SLOWER = 3.0
 """Half of the motions are so much slower: friction shows at low speeds, inertia at high ones."""
 _ACROSS_S = 0.1
 """Time over which speeds are measured that the joints have reached: noise of single frames is none."""
-TABLE, IMPORT = "next_motion.csv", "next_motion_import.yaml"
+SHOT, TABLE, IMPORT = "next_shot.yaml", "next_motion.csv", "next_motion_import.yaml"
 
 
 class Trials(Protocol):
@@ -94,7 +95,8 @@ class Shots:
         return {a.name: float(v) for a, v in zip(self.simulator.cell.action, self.inputs[trial], strict=False)}
 
     def files(self, trial: int) -> Mapping[str, str]:
-        return {}
+        """As `compass plan --shots` and `compass conceal --commands` read it."""
+        return {SHOT: yaml.safe_dump({"shots": [dict(self.action(trial))]}, sort_keys=False)}
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,13 +8,14 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from compass_ros.concealed.comparison import compare
 from compass_ros.concealed.seal import unseal
+from compass_ros.planning.trials import SHOT, TABLE
 from compass_ros.proof.marks import judge
 from compass_ros.reporting import read_result
 from compass_ros.worlds.scenes import MODULES
@@ -74,10 +75,13 @@ def concealed(suite: Suite, seed: int) -> Iterator[Concealed]:
     with tempfile.TemporaryDirectory(prefix="compass_proof_") as folder:
         root = Path(folder)
         world, answers = root / "world", root / "answers"
-        conceal = ["conceal", "--cell", suite.cell, "--seed", str(seed), "--out", str(world), "--answers", str(answers)]
-        conceal += suite.options
-        error, seconds = timed([sys.executable, "-m", "compass_ros.cli", *conceal], root)
+        error, seconds = timed(_conceal(suite, seed, world, answers), root)
         yield Concealed(root, world, answers, f"conceal: {error}" if error else "", seconds)
+
+
+def _conceal(suite: Suite, seed: int, world: Path, answers: Path) -> list[str]:
+    words = ["conceal", "--cell", suite.cell, "--seed", str(seed), "--out", str(world), "--answers", str(answers)]
+    return [sys.executable, "-m", "compass_ros.cli", *words, *suite.options]
 
 
 def run(suite: Suite, seed: int, method: str, threads: int) -> dict[str, object]:
@@ -103,10 +107,13 @@ def run(suite: Suite, seed: int, method: str, threads: int) -> dict[str, object]
             return {"error": f"calibrate: {error}", "seconds": seconds, "kind": opened.answer["kind"], "truth": truth}
         result = read_result(out / "result.json")
         if suite.name in FOREIGN:
+            marks = judge(result, opened.answer)
+            then = _next_experiment(suite, seed, made, out, given) if marks.verdict == "ambiguous" else None
             return {
                 "error": None,
                 "seconds": seconds,
-                "marks": judge(result, opened.answer).as_json(),
+                "marks": marks.as_json(),
+                "next_experiment": then,
                 "laws": _listed(opened.answer, "laws"),
                 "where": result["mismatch"]["where"],
                 "explanations": result["mismatch"]["explanations"][:_SHOWN],
@@ -123,6 +130,25 @@ def run(suite: Suite, seed: int, method: str, threads: int) -> dict[str, object]
             "sentence": result["mismatch"]["sentence"],
             "rollouts": result["budget"]["rollouts"],
         }
+
+
+def _next_experiment(
+    suite: Suite, seed: int, made: Concealed, out: Path, given: Sequence[str]
+) -> dict[str, object] | None:
+    """What became of an ambiguous verdict once the same world had played the experiment that it proposed; None where
+    that is another measurement, which no world plays."""
+    commands = next((out / name for name in (SHOT, TABLE) if (out / name).exists()), None)
+    if commands is None:
+        return None
+    told, result = made.root / "next", made.root / "next_result"
+    error, _ = timed([*_conceal(suite, seed, told, made.answers), "--commands", str(commands)], made.root)
+    if not error:
+        words = [str(result) if word == str(out) else word for word in given]
+        error, _ = made.blindly("calibrate", str(made.world), str(told), *words)
+    if error:
+        return {"error": error, "resolved": False}
+    marks = judge(read_result(result / "result.json"), unseal(told, made.answers).answer)
+    return {"error": None, "resolved": marks.right and marks.verdict == "named", "marks": marks.as_json()}
 
 
 _SHOWN = 5

@@ -31,10 +31,16 @@ def rows(found: Sequence[Line]) -> list[Row]:
         at_least("site right where named", _is(sited, "sites_right"), 0.95),
         at_least("two laws: both", _is(clear["two"], "right"), 0.65),
         medians("share of the excess held-out error removed, median", gains, 0.9),
+        at_least("one proposed experiment resolves an ambiguous verdict", _resolved(found), 0.7),
         _calibration(pairs),
         Row("Brier score of the probabilities", "-", _brier(pairs), "-", str(len(pairs)), None),
         Row("calibration and discovery, median [s]", "-", _median(seconds), "-", str(len(seconds)), None),
     ]
+
+
+def _resolved(found: Sequence[Line]) -> list[bool]:
+    """Of ambiguous verdicts that proposed what a world can play."""
+    return [bool(x["next_experiment"]["resolved"]) for x in found if x.get("next_experiment")]
 
 
 def reliability(pairs: Sequence[tuple[float, bool]]) -> list[tuple[float, float, int]]:

@@ -21,6 +21,10 @@ TABLES: Mapping[str, str] = {"air_hockey": "table.scene"}
 """The same of cells that have worlds on the suite's own scene too (`concealed/`): asked for by `--forms foreign`."""
 
 
+COMMANDED = ("air_hockey", "two_joint_arm_driven", "kinova3", "kinova3_effort")
+"""Cells whose worlds can be told what to do (`Asked.commands`)."""
+
+
 def scene_of(cell: str) -> Scene | None:
     """The scene of a cell by its name; None where it has none."""
     module = {**MODULES, **TABLES}.get(cell)

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal, Protocol
 
-from compass_ros.types import Episode, Parameter
+from compass_ros.types import Episode, Floats, Parameter
 
 Kind = Literal["none", "one", "two", "outside"]
 UNKNOWN = "unknown"
@@ -37,6 +37,9 @@ class Asked:
     """None: drawn."""
     names: tuple[str, ...] = ()
     """Laws by the scene's own names, at most two; they decide the kind."""
+    commands: Floats | None = None
+    """What the world is told, in the place of what is drawn for it: (S, 4) shots of a table, (E, n, J) positions [rad]
+    at 100 Hz for the joints of a driven arm. All else stays as it is."""
 
 
 @dataclass(frozen=True)

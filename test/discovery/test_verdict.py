@@ -18,7 +18,7 @@ def explaining(models: Mapping[str, float]) -> list[str]:
     laws = {m: [SimpleNamespace(effect=SimpleNamespace(name=letter)) for letter in m] for m in models}
     said = tuple(SimpleNamespace(said=m, physics=laws[m]) for m in models)
     found = Found(cast(Any, None), -800.0, cast(Any, said), tuple(np.log(list(models.values())) + 400.0), ())
-    judge = Judge(found, cast(Any, None), cast(Any, None), 0.01, 0.0, np.zeros(1), (), 0, ())
+    judge = Judge(found, cast(Any, None), cast(Any, None), 0.01, 0.0, np.zeros(1), (), ())
     return [cast(Any, m).said for m in judge._explaining(found.probabilities[2])]
 
 

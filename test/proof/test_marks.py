@@ -129,6 +129,16 @@ def test_a_world_that_failed_counts_as_wrong() -> None:
     assert found["nothing missing"].count == "1 of 2"
 
 
+def test_experiments_that_were_played_are_counted() -> None:
+    """Not those that no world plays."""
+    played: list[dict[str, Any]] = [
+        {"next_experiment": {"error": None, "resolved": resolved}} for resolved in (True, False, True)
+    ]
+    every = [line("nothing") | one for one in (*played, {"next_experiment": None}, {})]
+    found = {row.what: row for row in rows(every)}
+    assert found["one proposed experiment resolves an ambiguous verdict"].count == "2 of 3"
+
+
 def test_probabilities_that_are_right_as_often_as_they_say_are_calibrated() -> None:
     pairs = [(0.9, i < 9) for i in range(10)] + [(0.1, i < 1) for i in range(10)]
     assert all(abs(p - share) < 1e-12 for p, share, _ in reliability(pairs))

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
+from compass_ros.types import Floats
 from compass_ros.worlds.arms import draws
 from compass_ros.worlds.arms.arm import Arm
-from compass_ros.worlds.arms.motions import Range, commands, driven
+from compass_ros.worlds.arms.motions import RATE_HZ, Range, commands, driven
 from compass_ros.worlds.arms.scene import Motion, Sensors, Setup, make
 from compass_ros.worlds.world import Asked, Task, World
 
@@ -16,7 +17,11 @@ RANGES = [Range(0.8, 0.7), Range(0.8, 0.7)]
 
 
 def _motion(arm: Arm, rng: Generator) -> Motion:
-    time, targets = commands(RANGES, SECONDS, rng)
+    return _told(arm, commands(RANGES, SECONDS, rng)[1], rng)
+
+
+def _told(arm: Arm, targets: Floats, rng: Generator) -> Motion:
+    time = np.arange(targets.shape[1]) / RATE_HZ
     return Motion(driven(time, targets, arm.delay, False, rng), time, targets)
 
 
@@ -26,6 +31,7 @@ SETUP = Setup(
            {**draws.LATE, **draws.CLOCK}, draws.SENSING),
     outside={**draws.STRANGE, **draws.GEAR_ERROR},
     motion=_motion,
+    told=_told,
     sensors=Sensors(noise=0.0003, step=2 * np.pi / 2**12),
     tool=(0.0, 0.0, -0.3),
     load=(0.03, 0.25),

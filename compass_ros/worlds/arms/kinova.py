@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 from numpy.random import Generator
 
+from compass_ros.types import Floats
 from compass_ros.worlds.arms import draws
 from compass_ros.worlds.arms.arm import Arm
-from compass_ros.worlds.arms.motions import Range, commands, driven
+from compass_ros.worlds.arms.motions import RATE_HZ, Range, commands, driven
 from compass_ros.worlds.arms.scene import Motion, Sensors, Setup, make
 from compass_ros.worlds.world import Asked, Task, World
 
@@ -21,13 +23,21 @@ RANGES = [Range(1.5, 0.6), Range(0.7, 0.6), Range(1.5, 0.6), Range(1.2, 0.7), Ra
 EFFORT = "kinova3_effort"
 
 
-def _held(arm: Arm, rng: Generator) -> Motion:
-    time, targets = commands(RANGES, SECONDS, rng)
+def _drawn(arm: Arm, rng: Generator) -> Motion:
+    return _held(arm, commands(RANGES, SECONDS, rng)[1], rng)
+
+
+def _drawn_as_lines(arm: Arm, rng: Generator) -> Motion:
+    return _interpolated(arm, commands(RANGES, SECONDS, rng)[1], rng)
+
+
+def _held(arm: Arm, targets: Floats, rng: Generator) -> Motion:
+    time = np.arange(targets.shape[1]) / RATE_HZ
     return Motion(driven(time, targets, arm.delay, False, rng), time, targets)
 
 
-def _interpolated(arm: Arm, rng: Generator) -> Motion:
-    time, targets = commands(RANGES, SECONDS, rng)
+def _interpolated(arm: Arm, targets: Floats, rng: Generator) -> Motion:
+    time = np.arange(targets.shape[1]) / RATE_HZ
     return Motion(driven(time, targets, arm.delay, True, rng), time, targets)
 
 
@@ -36,14 +46,19 @@ SETUP = Setup(
     known=({**draws.FRICTION, **draws.LOAD}, draws.FIELDS, draws.GEARS, draws.BODIES, draws.SERVOS, draws.CLOCK,
            draws.SENSING),
     outside={**draws.STRANGE, **draws.GEAR_ERROR},
-    motion=_held,
+    motion=_drawn,
+    told=_held,
     sensors=Sensors(noise=0.0002, step=0.0003),
     tool=(0.0, 0.0, -0.12),
     load=(0.1, 1.0),
     share=2.0,
 )  # fmt: skip
 WITH_EFFORT = replace(
-    SETUP, name=EFFORT, motion=_interpolated, sensors=Sensors(noise=0.0002, step=0.0003, effort_noise=0.3)
+    SETUP,
+    name=EFFORT,
+    motion=_drawn_as_lines,
+    told=_interpolated,
+    sensors=Sensors(noise=0.0002, step=0.0003, effort_noise=0.3),
 )
 
 

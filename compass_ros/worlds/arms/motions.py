@@ -95,4 +95,4 @@ def driven(time: Floats, targets: Floats, delay: float, linear: bool, rng: Gener
                 held = np.concatenate([own[:1], own])
                 area = np.concatenate([[0.0], np.cumsum(held * np.diff(known))])
                 told[e, :, j] = np.diff(np.interp(edges, known, area)) / STEP_S
-    return Drive(told, targets[:, 0], BEFORE_S, seconds + AFTER_S, RATE_HZ, sessions(rng))
+    return Drive(told, targets[:, 0], BEFORE_S, seconds + AFTER_S, RATE_HZ, sessions(rng, len(targets)))

@@ -58,6 +58,7 @@ class Setup:
     """Families of laws; two laws of one world are of two families."""
     outside: Mapping[str, Draw]
     motion: Callable[[Arm, Generator], Motion]
+    """As it is drawn."""
     sensors: Sensors
     tool: tuple[float, float, float]
     """Where the last link holds things, in its frame [m]."""
@@ -67,6 +68,8 @@ class Setup:
     """(J,) of gravity on an arm without drives, about [N m]."""
     share: float = 1.0
     """See `Use.share`."""
+    told: Callable[[Arm, Floats, Generator], Motion] | None = None
+    """The motion of (E, n, J) positions at RATE_HZ; None: nobody drives it."""
 
 
 def make(setup: Setup, task: Task, asked: Asked) -> World:
@@ -88,6 +91,9 @@ def make(setup: Setup, task: Task, asked: Asked) -> World:
         without = _played(arm, motion.drive, others) if others else plain
         said.append(replace(law.missing(arm), strength=_strength(setup.sensors, full, without)))
     strength = _strength(setup.sensors, full, plain)
+    if asked.commands is not None and setup.told is not None:
+        motion = setup.told(arm, asked.commands, rng["motions"])
+        full = _played(arm, motion.drive, laws)
     episodes = _episodes(task, setup.sensors, arm, motion, full, rng["noise"])
     return World(task.name, episodes, _answer(task, setup, asked, kind, said, values, strength))
 

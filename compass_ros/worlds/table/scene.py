@@ -34,8 +34,8 @@ def conceal(task: Task, asked: Asked) -> World:
     kind, names = draw.laws(asked, KNOWN, OUTSIDE, rng["kind"])
     values = draw.true_values(task.parameters, rng["values"])
     found = {name: DRAW[name](rng["laws"]) for name in names}
-    commands = rng["shots"].uniform(LOW, HIGH, (SHOTS, 4))
-    strokes = rng["strokes"].normal(size=SHOTS)
+    commands = rng["shots"].uniform(LOW, HIGH, (SHOTS, 4)) if asked.commands is None else asked.commands
+    strokes = rng["strokes"].normal(size=len(commands))
     time_s = np.arange(-int(BEFORE_S * RATE_HZ), int(DURATION_S * RATE_HZ)) / RATE_HZ
     paths: dict[tuple[str, ...], Floats] = {}
 
