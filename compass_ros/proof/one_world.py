@@ -108,7 +108,7 @@ def run(suite: Suite, seed: int, method: str, threads: int) -> dict[str, object]
         result = read_result(out / "result.json")
         if suite.name in FOREIGN:
             marks = judge(result, opened.answer)
-            then = _next_experiment(suite, seed, made, out, given) if marks.verdict == "ambiguous" else None
+            then = next_experiment(suite, seed, made, out, given) if marks.verdict == "ambiguous" else None
             return {
                 "error": None,
                 "seconds": seconds,
@@ -132,7 +132,7 @@ def run(suite: Suite, seed: int, method: str, threads: int) -> dict[str, object]
         }
 
 
-def _next_experiment(
+def next_experiment(
     suite: Suite, seed: int, made: Concealed, out: Path, given: Sequence[str]
 ) -> dict[str, object] | None:
     """What became of an ambiguous verdict once the same world had played the experiment that it proposed; None where
