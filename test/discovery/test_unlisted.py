@@ -51,6 +51,8 @@ PLANTED = {
 }
 """How far off: a rotor, a mass, its place, a gain, the length of a link."""
 NAMED = [name for name in PLANTED if name not in ("elbow@dyna@stiffness", "shoulder@dyna@armature")]
+NIGHTLY = ("lower@dyna@centre_x", "lower@pose@z")
+"""Of these, those that are not named in every run of all tests."""
 
 
 def arm(folder: Path) -> Cell:
@@ -168,7 +170,9 @@ def test_the_sentence_has_the_number_as_it_is_and_as_it_should_be(tmp_path: Path
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.nightly if name in NIGHTLY else ()) for name in NAMED]
+)
 def test_a_wrong_number_is_named(tmp_path: Path, name: str) -> None:
     cell = arm(tmp_path)
     attached = law(Simulator(cell, threads=1), name)

@@ -31,17 +31,17 @@ def values(episode: Episode) -> list[bytes]:
 
 
 def test_a_table_that_is_told_what_it_draws_gives_the_same_bits() -> None:
-    drawn = world("air_hockey", Asked(5, "one"))
+    drawn = world("air_hockey", Asked(5, "none"))
     shots = np.array([[*e.action.values()] for e in drawn.episodes])
-    told = world("air_hockey", Asked(5, "one", commands=shots))
+    told = world("air_hockey", Asked(5, "none", commands=shots))
     assert told.answer == drawn.answer
     assert [values(e) for e in told.episodes] == [values(e) for e in drawn.episodes]
 
 
 def test_an_arm_that_is_told_what_it_draws_gives_the_same_bits() -> None:
-    drawn = world("two_joint_arm_driven", Asked(6, "one", ("stribeck_curve",)))
+    drawn = world("two_joint_arm_driven", Asked(6, "none"))
     targets = np.stack([e.inputs[0].value for e in drawn.episodes])
-    told = world("two_joint_arm_driven", Asked(6, "one", ("stribeck_curve",), targets))
+    told = world("two_joint_arm_driven", Asked(6, "none", commands=targets))
     assert told.answer == drawn.answer
     assert [values(e) for e in told.episodes] == [values(e) for e in drawn.episodes]
 
