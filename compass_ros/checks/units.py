@@ -26,6 +26,7 @@ from compass_ros.checks.signals import Part
 from compass_ros.errors import DataError
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import recordings
+from compass_ros.simulation.sites import driven_joint
 from compass_ros.simulation.windows import windows
 from compass_ros.types import Bools, Episode, Floats, Track
 
@@ -128,8 +129,7 @@ def _told(simulator: Simulator, group: Sequence[tuple[str, Part]]) -> dict[str, 
     out = {}
     for spec in cell.spec.inputs:
         if spec.to == "ctrl" and spec.quantity in ("joint_position", "joint_velocity"):
-            driven = [model.joint(int(model.actuator(name).trnid[0])).name for name in spec.targets]
-            out[spec.name] = [i for i, joint in enumerate(driven) if joint in joints]
+            out[spec.name] = [i for i, name in enumerate(spec.targets) if driven_joint(model, name) in joints]
     return {name: columns for name, columns in out.items() if columns}
 
 

@@ -21,7 +21,7 @@ from compass_ros.discovery.words import DEPENDS, corrected, errors, missing, pla
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.simulation.replay import rms_distance
-from compass_ros.simulation.sites import PLANAR, Site, word_of
+from compass_ros.simulation.sites import Site, any_slides, word_of
 from compass_ros.types import (
     GENERAL,
     EffectFinding,
@@ -241,7 +241,7 @@ class Judge:
     @property
     def _flat(self) -> bool:
         """Whether something that is tracked slides in a plane."""
-        return any(site.kind in PLANAR for site in self.simulator.moving.values())
+        return any_slides(self.simulator.moving)
 
     @property
     def _floor(self) -> float:

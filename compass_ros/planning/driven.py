@@ -70,12 +70,9 @@ def _limits(cell: Cell, driven: Driven, episodes: Sequence[Episode], wishes: Wis
 
 def _within_seen(cell: Cell, driven: Driven, episodes: Sequence[Episode]) -> Driven:
     """The same with ranges that were measured in the place of what the scene leaves open."""
-    low, high, home = driven.low.copy(), driven.high.copy(), driven.home.copy()
+    seen = {}
     for signal in (s for s in cell.signals if s.quantity == "joint_position"):
         for column, joint in enumerate(signal.at):
-            if joint in driven.without_range:
-                i = driven.joints.index(joint)
-                values = np.concatenate([e.track(signal.name).value[:, column] for e in episodes])
-                low[i], high[i] = np.nanmin(values), np.nanmax(values)
-                home[i] = home[i] if low[i] < home[i] < high[i] else 0.5 * (low[i] + high[i])
-    return replace(driven, low=low, high=high, home=home)
+            values = np.concatenate([e.track(signal.name).value[:, column] for e in episodes])
+            seen[joint] = (float(np.nanmin(values)), float(np.nanmax(values)))
+    return driven.between(seen)

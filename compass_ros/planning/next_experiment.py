@@ -13,13 +13,12 @@ from itertools import combinations
 
 import numpy as np
 
-from compass_ros.calibration.least_squares import normal_equations
 from compass_ros.discovery import Discovery
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.planning.other_measurements import between, of_unknown
 from compass_ros.planning.trials import Trials, trials
 from compass_ros.simulation import Simulator
-from compass_ros.simulation.sites import PLANAR
+from compass_ros.simulation.sites import any_slides
 from compass_ros.types import Floats
 
 DRAWS = 6
@@ -49,7 +48,7 @@ def with_next(found: Discovery, simulator: Simulator, seed: int) -> Discovery:
     if mismatch.verdict == "ambiguous":
         following = next_experiment(simulator, found.rivals, seed)
     elif mismatch.verdict == "unknown" and mismatch.where is not None:
-        advice = of_unknown(mismatch.where.channel, _flat(simulator))
+        advice = of_unknown(mismatch.where.channel, any_slides(simulator.moving))
         following = NextExperiment(f"To see what it depends on, {advice}.")
     if not following.sentence:
         return found
@@ -65,7 +64,7 @@ def next_experiment(simulator: Simulator, rivals: Sequence[Hypothesis], seed: in
     pairs = list(combinations(range(len(rivals)), 2))
     if not pairs:
         return NextExperiment("")
-    flat = _flat(simulator)
+    flat = any_slides(simulator.moving)
     tried = trials(simulator, rivals[0].likelihood, seed, count)
     if tried is None:
         return NextExperiment(_other(rivals, pairs, "recording of this kind", flat))
@@ -89,12 +88,9 @@ def next_experiment(simulator: Simulator, rivals: Sequence[Hypothesis], seed: in
 
 def _predictions(rival: Hypothesis, tried: Trials, rng: np.random.Generator) -> Floats:
     """(1 + DRAWS, S, D) predictions [sigma] at the best values, and at draws from the posterior."""
-    fit, likelihood = rival.fit, rival.likelihood
-    hessian, _ = normal_equations(likelihood, fit.point, fit.linear, fit.free, fit.robust)
-    p = len(fit.free)
-    factor = np.linalg.cholesky(np.linalg.inv(hessian)[:p, :p] * likelihood.correlation_time)
-    values = np.tile(fit.point.values, (1 + DRAWS, 1))
-    values[1:, fit.free] += rng.normal(size=(DRAWS, p)) @ factor.T * likelihood.prior_std[fit.free]
+    likelihood, root = rival.likelihood, rival.root
+    values = np.tile(rival.fit.point.values, (1 + DRAWS, 1))
+    values[1:] += rng.normal(size=(DRAWS, root.shape[1])) @ root.T
     return tried.predicted(rival.simulator, np.clip(values, likelihood.low, likelihood.high))
 
 
@@ -116,8 +112,3 @@ def _other(rivals: Sequence[Hypothesis], pairs: Sequence[tuple[int, int]], word:
         f"No {word} tells {rivals[a].name} from {rivals[b].name}: {between(names[a], names[b], flat)}."
         for a, b in pairs
     )
-
-
-def _flat(simulator: Simulator) -> bool:
-    """Whether something that is tracked slides in a plane."""
-    return any(site.kind in PLANAR for site in simulator.moving.values())

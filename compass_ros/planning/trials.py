@@ -59,9 +59,8 @@ def trials(simulator: Simulator, likelihood: Likelihood, seed: int, count: int =
     `count`: how many are tried; 0: SHOTS or MOTIONS.
     """
     sigma = np.median(likelihood.sigma[:, : max(likelihood.sigma.shape[1] // 4, 1)], axis=(0, 1))
-    sigma = np.where(
-        np.isnan(likelihood.measured).all(axis=(0, 1)), np.inf, sigma
-    )  # what is not compared tells nothing
+    compared = ~np.isnan(likelihood.measured).all(axis=(0, 1))
+    sigma = np.where(compared, sigma, np.inf)
     if simulator.cell.spec.inputs:
         return _motions(simulator, likelihood, sigma, seed, count or MOTIONS)
     if not simulator.cell.action or simulator.cell.spec.start:
@@ -164,19 +163,11 @@ def _reached(simulator: Simulator, likelihood: Likelihood, driven: Driven) -> tu
     frames = max(round(_ACROSS_S / float(np.nanmedian(np.diff(likelihood.time_s)))), 1)
     apart = likelihood.time_s[:, frames:] - likelihood.time_s[:, :-frames]
     moved = np.abs(likelihood.measured[:, frames:] - likelihood.measured[:, :-frames]) / apart[:, :, None]
-    low, high, home, speed = (
-        driven.low.copy(),
-        driven.high.copy(),
-        driven.home.copy(),
-        np.full(len(driven.home), np.nan),
-    )
+    speed, seen = np.full(len(driven.joints), np.nan), {}
     for signal in (s for s in simulator.cell.signals if s.quantity == "joint_position"):
         for column, joint in enumerate(signal.at, signal.first):
             places = likelihood.measured[:, :, column]
             if joint in driven.joints and not np.isnan(places).all():
-                i = driven.joints.index(joint)
-                speed[i] = np.nanmax(moved[:, :, column])
-                if joint in driven.without_range:
-                    low[i], high[i] = np.nanmin(places), np.nanmax(places)
-                    home[i] = home[i] if low[i] < home[i] < high[i] else 0.5 * (low[i] + high[i])
-    return replace(driven, low=low, high=high, home=home), np.where(np.isnan(speed), np.nanmin([*speed, 1.0]), speed)
+                speed[driven.joints.index(joint)] = np.nanmax(moved[:, :, column])
+                seen[joint] = (float(np.nanmin(places)), float(np.nanmax(places)))
+    return driven.between(seen), np.where(np.isnan(speed), np.nanmin([*speed, 1.0]), speed)

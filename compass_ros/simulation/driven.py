@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -13,6 +14,7 @@ from compass_ros.cells.keyframe import begun
 from compass_ros.cells.series import OF_JOINTS, InputSpec
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.simulator import Simulator
+from compass_ros.simulation.sites import OF_JOINT
 from compass_ros.types import Bools, Episode, Floats, Ints, Track
 
 FIRST_NS = 1_700_000_000_000_000_000
@@ -22,7 +24,6 @@ SETTLED_S = 2.0
 """How long the first target was held before a recording begins; a torque is not held, an arm would fall."""
 _NEAR = 0.1
 """Share of a joint's range: nearer to an end there is no room for a motion."""
-_JOINTS = {int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)}
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,16 @@ class Driven:
     def settled_s(self) -> float:
         return 0.0 if self.spec.quantity == "joint_effort" else SETTLED_S
 
+    def between(self, seen: Mapping[str, tuple[float, float]]) -> Driven:
+        """The same, with the least and largest place of a joint in the place of a range that the scene leaves open."""
+        low, high, home = self.low.copy(), self.high.copy(), self.home.copy()
+        for joint in self.without_range:
+            if joint in seen:
+                i = self.joints.index(joint)
+                low[i], high[i] = seen[joint]
+                home[i] = home[i] if low[i] < home[i] < high[i] else 0.5 * (low[i] + high[i])
+        return replace(self, low=low, high=high, home=home)
+
 
 @dataclass(frozen=True)
 class Asked:
@@ -77,7 +88,7 @@ def driven_joints(simulator: Simulator) -> Driven:
     if spec.measured:
         raise ConfigError(f"{cell.path}: inputs: {spec.name}: it was measured, and nobody can play it")
     actuators = [model.actuator(name).id for name in spec.targets] if spec.to == "ctrl" else []
-    if any(int(model.actuator_trntype[a]) not in _JOINTS for a in actuators):
+    if any(int(model.actuator_trntype[a]) not in OF_JOINT for a in actuators):
         raise ConfigError(f"{cell.path}: inputs: {spec.name}: its actuators do not act on single joints")
     joints = [int(model.actuator_trnid[a, 0]) for a in actuators] or [model.joint(name).id for name in spec.targets]
     forces = spec.quantity == "joint_effort"

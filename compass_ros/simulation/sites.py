@@ -6,7 +6,7 @@ to see whether it fails.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -81,6 +81,14 @@ _WORDS: dict[SiteKind, str] = {
 _SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
 ONE_DOF = (_HINGE, _SLIDE)
 OF_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+
+
+def driven_joint(model: mujoco.MjModel, actuator: str) -> str:
+    """Name of the joint that an actuator acts on; empty where it is none, but a tendon or a site."""
+    index = model.actuator(actuator).id
+    if int(model.actuator_trntype[index]) not in OF_JOINT:
+        return ""
+    return str(model.joint(int(model.actuator_trnid[index, 0])).name)
 
 
 @dataclass(frozen=True)
@@ -344,3 +352,8 @@ def carriers(model: mujoco.MjModel, body: int) -> set[int]:
 def names_of(sites: Iterable[Site]) -> tuple[str, ...]:
     """All names of some sites, in their order."""
     return tuple(name for site in sites for name in site.names)
+
+
+def any_slides(moving: Mapping[str, Site]) -> bool:
+    """Whether something that is tracked slides in a plane."""
+    return any(site.kind in PLANAR for site in moving.values())
