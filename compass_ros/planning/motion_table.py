@@ -62,7 +62,9 @@ def read_commands(path: Path, cell: Cell) -> Floats:
         with path.open(encoding="utf-8", newline="") as lines:
             for row in csv.DictReader(lines):
                 motions.setdefault(row["motion"], []).append([float(row[name]) for name in names])
-    except (OSError, KeyError, ValueError) as error:
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+    except (KeyError, ValueError) as error:
         raise ConfigError(f"{path}: expected columns motion, {', '.join(names)}: {error}") from error
     if len({len(rows) for rows in motions.values()}) != 1:
         raise ConfigError(f"{path}: expected motions of one length, found {[len(r) for r in motions.values()]}")
