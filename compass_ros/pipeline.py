@@ -109,8 +109,8 @@ def searched(
     try:
         refined = refined or refine(posed.problem.likelihood, estimate.values)
         found = discover(posed.simulator, refined, posed.unseen, posed.noise, config.false_alarm, config.seed, report)
-        return with_next(found, posed.simulator, config.seed)
     except DataError as error:
         return not_evaluated(str(error))
     except np.linalg.LinAlgError as error:
         return fit_failed(f"a step of the search has no solution ({error})")
+    return with_next(found, posed.simulator, config.seed)

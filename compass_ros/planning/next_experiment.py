@@ -15,6 +15,7 @@ import numpy as np
 
 from compass_ros.discovery import Discovery
 from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.errors import DataError
 from compass_ros.planning.other_measurements import between, of_unknown
 from compass_ros.planning.trials import Trials, trials
 from compass_ros.simulation import Simulator
@@ -42,11 +43,17 @@ class NextExperiment:
 
 
 def with_next(found: Discovery, simulator: Simulator, seed: int) -> Discovery:
-    """A verdict that leaves something open, with what would settle it. `simulator`: without laws."""
+    """A verdict that leaves something open, with what would settle it; the verdict stands where that is not found.
+
+    `simulator`: without laws.
+    """
     mismatch = found.mismatch
     following = NextExperiment("")
     if mismatch.verdict == "ambiguous":
-        following = next_experiment(simulator, found.rivals, seed)
+        try:
+            following = next_experiment(simulator, found.rivals, seed)
+        except (DataError, np.linalg.LinAlgError) as error:
+            following = NextExperiment(f"What to record next could not be worked out: {error}.")
     elif mismatch.verdict == "unknown" and mismatch.where is not None:
         advice = of_unknown(mismatch.where.channel, any_slides(simulator.moving))
         following = NextExperiment(f"To see what it depends on, {advice}.")

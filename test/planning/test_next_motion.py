@@ -16,6 +16,7 @@ from compass_ros.cells import Cell
 from compass_ros.discovery import Discovery
 from compass_ros.discovery.hypothesis import Hypothesis, widened
 from compass_ros.episodes.tables import import_tables
+from compass_ros.errors import DataError
 from compass_ros.operation.current import read_usable
 from compass_ros.planning.next_experiment import NextExperiment, next_experiment, with_next
 from compass_ros.planning.trials import IMPORT, TABLE
@@ -138,3 +139,17 @@ def test_what_is_unknown_is_asked_for_too(rivals: tuple[Cell, Hypothesis, Hypoth
         "To see what it depends on, repeat the motions at a third of their speed and at three times that, and from "
         "other places."
     )
+
+
+@pytest.mark.parametrize("error", [DataError("nothing moves"), np.linalg.LinAlgError("Singular matrix")])
+def test_a_verdict_stands_where_no_experiment_can_be_found(
+    rivals: tuple[Cell, Hypothesis, Hypothesis], monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    def trials(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("compass_ros.planning.next_experiment.trials", trials)
+    cell, *both = rivals
+    open_one = Discovery(Mismatch("ambiguous", None, (), (), "", ""), rivals=tuple(both))
+    then = with_next(open_one, Simulator(cell, threads=1), 0).mismatch
+    assert (then.verdict, str(error) in then.next_experiment) == ("ambiguous", True)
