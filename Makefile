@@ -41,14 +41,25 @@ SITE    := .venv-site
 demo: install
 	$(BIN)/compass demo $(ARGS)
 
-# Two test processes on two cores: linear algebra must not start threads of its own.
+# Nodes wait for each other most of the time: all else runs beside them, behind them in rank, or they would be late. Linear
+# algebra must not start threads of its own.
 test: export OMP_NUM_THREADS = 1
 test: install readers
 	$(BIN)/ruff check .
-	@# nodes wait for each other most of the time, and mypy takes one core beside them
-	$(BIN)/mypy > $(STAMPS)/mypy.txt 2>&1 & mypy=$$!; $(BIN)/python -m pytest -m ros $(ARGS); nodes=$$?; \
-	wait $$mypy; types=$$?; cat $(STAMPS)/mypy.txt; exit $$((nodes | types))
-	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not ros and not nightly" $(ARGS)
+	$(MAKE) --no-print-directory --jobs 3 --keep-going nodes types core
+
+.PHONY: nodes types core
+nodes:
+	$(BIN)/python -m pytest -m ros $(ARGS)
+
+# What runs beside the nodes is shown when it has ended; until then it is in a file.
+types:
+	@nice -n 10 $(BIN)/mypy > $(STAMPS)/mypy.txt 2>&1; status=$$?; cat $(STAMPS)/mypy.txt; exit $$status
+
+core:
+	@echo "all other tests write into $(STAMPS)/core.txt until they have ended"
+	@nice -n 15 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not ros and not nightly" $(ARGS) \
+	> $(STAMPS)/core.txt 2>&1; status=$$?; cat $(STAMPS)/core.txt; exit $$status
 
 # What takes half a minute and more, and is not the first to break.
 nightly: install readers

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from compass_ros.calibration.cost import launches_away
+from compass_ros.calibration.cost import Point, launches_away
 from compass_ros.calibration.least_squares import Fit, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.evidence import Tangent
@@ -21,6 +21,7 @@ from compass_ros.simulation.extents import along
 from compass_ros.simulation.kicks import Kicks, inertias, kicks
 from compass_ros.simulation.simulator import in_chunks
 from compass_ros.simulation.sites import JOINTS, PLANAR, Site
+from compass_ros.simulation.visited import Visited
 from compass_ros.types import Floats, Ints
 
 
@@ -43,7 +44,7 @@ class Response:
     inertia: Floats
     """(F,) its entry of the mass matrix, mean over all moments [kg or kg m^2]."""
     unit: Floats
-    """(S,) of forces the rms acceleration of the fitted motion [m/s^2 or rad/s^2], of signals the rms of what moves."""
+    """(S,) of forces what moves and holds it (`at_work`) [m/s^2 or rad/s^2], of signals the rms of what moves."""
     pushes: Floats
     """(E, D, K, S) change of the residual [sigma] per unit around a moment."""
 
@@ -273,9 +274,22 @@ def respond(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> Response:
     model = simulator.physics.model
     speeds = unit_kicks.states[..., 1 + model.nq : 1 + model.nq + model.nv][..., dofs]
     accelerations = np.sqrt(np.mean(np.diff(speeds, axis=1) ** 2, axis=(0, 1))) / spacing
-    unit = np.concatenate([accelerations, motion(likelihood)])
+    unit = np.concatenate([at_work(simulator, likelihood, point, sites, site_of, accelerations), motion(likelihood)])
     rows = (len(inputs), seen[0].size, len(unit_kicks.moments_s), len(unit))
     return Response(simulator, likelihood, fit, unit_kicks, sites, site_of, inertia, unit, pushes.reshape(rows))
+
+
+def at_work(
+    simulator: Simulator, likelihood: Likelihood, point: Point, sites: Sequence[Site], site_of: Ints, moving: Floats
+) -> Floats:
+    """(F,) `moving`, the rms acceleration; of a joint what gravity and drives would give it alone, where that is more.
+
+    A servo against its friction exerts much and accelerates little: what is missing there has the size of the forces,
+    as laws on joints have (`simulation/sizes.py`).
+    """
+    sizes = Visited(simulator, point.values, likelihood.inputs + point.launch, likelihood.time_s).joint_sizes()
+    forces = [sizes[name].force / sizes[name].inertia if name in sizes else 0.0 for name in (s.name for s in sites)]
+    return np.maximum(moving, np.array(forces)[site_of])
 
 
 def motion(likelihood: Likelihood) -> Floats:

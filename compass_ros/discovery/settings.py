@@ -13,7 +13,7 @@ RHO_PRIOR = (0.32, 0.21, 0.16, 0.15, 0.1, 0.06)
 """Size of the discrepancy of a law, as a share of the law's own: published forms of one law differ by 2 to 10 per
 cent of it, and one that would need more than a fifth is another law (the study's table)."""
 FREE = tuple(np.geomspace(1e-3, 1.0, 10).tolist())
-"""Size of the discrepancy without a law, as a share of the rms acceleration of the motion, equally probable."""
+"""Size of the discrepancy without a law, as a share of what moves and holds a site (`at_work`), equally probable."""
 PRIOR_UNKNOWN = float(np.log(0.5))
 PRIOR_LAW = float(np.log(0.5))
 """Log prior odds against the plain model: half of the probability is that nothing is missing, a quarter that of
