@@ -37,7 +37,7 @@ def said(cell_of: Path, laws: Sequence[str], numbers: Sequence[float], force: fl
         ("stribeck_friction", [0.15, 1.0], 1.0),
         pytest.param("stribeck_friction", [0.15, 3.0], 1e-3, marks=pytest.mark.nightly),
         pytest.param("quadratic_drag", [0.02], 1.0, marks=pytest.mark.nightly),
-        ("spring", [1.0, 0.4, 0.0], 1.0),
+        pytest.param("spring", [1.0, 0.4, 0.0], 1.0, marks=pytest.mark.nightly),
         ("actuation_delay", [0.03], 1.0),
     ],
 )

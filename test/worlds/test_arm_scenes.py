@@ -22,6 +22,7 @@ from compass_ros.types import Floats
 from compass_ros.worlds import draw
 from compass_ros.worlds.arms import draws
 from compass_ros.worlds.arms.arm import Arm
+from compass_ros.worlds.arms.driven import SETUP as DRIVEN
 from compass_ros.worlds.arms.kinova import SETUP as KINOVA
 from compass_ros.worlds.arms.passive import SETUP as PASSIVE
 from compass_ros.worlds.arms.scene import Motion, Setup, make
@@ -41,11 +42,12 @@ def series(made: World) -> list[Floats]:
 
 
 def laws() -> list[tuple[Setup, str, str]]:
-    found = [(PASSIVE, "two_joint_arm", name) for names in PASSIVE.known for name in names]
-    found += [(PASSIVE, "two_joint_arm", name) for name in PASSIVE.outside]
-    passive = {name for _, _, name in found}
-    every = {**{n: 0 for names in KINOVA.known for n in names}, **dict.fromkeys(KINOVA.outside)}
-    return found + [(KINOVA, "kinova3", name) for name in every if name not in passive]
+    """Each law once, on the smallest arm that has it."""
+    found: dict[str, tuple[Setup, str, str]] = {}
+    for setup in (KINOVA, DRIVEN, PASSIVE):
+        for names in (*setup.known, setup.outside):
+            found.update({name: (setup, setup.name, name) for name in names})
+    return list(found.values())
 
 
 def brief(setup: Setup) -> Setup:

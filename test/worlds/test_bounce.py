@@ -84,6 +84,7 @@ def test_a_loose_plate_shares_energy_with_the_ball_and_a_heavy_one_does_not() ->
     assert total == pytest.approx(0.057, rel=1e-3)
 
 
+@pytest.mark.nightly
 def test_a_world_is_its_seed_alone() -> None:
     asked = Asked(2, None, ("adhesion",))
     one, again = (scene.conceal(TASK, asked) for _ in range(2))

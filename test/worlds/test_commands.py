@@ -30,6 +30,7 @@ def values(episode: Episode) -> list[bytes]:
     return [track.value.tobytes() for track in (*episode.tracks, *episode.inputs)]
 
 
+@pytest.mark.nightly
 def test_a_table_that_is_told_what_it_draws_gives_the_same_bits() -> None:
     drawn = world("air_hockey", Asked(5, "none"))
     shots = np.array([[*e.action.values()] for e in drawn.episodes])
