@@ -116,6 +116,7 @@ def force(law: laws.Drawn, one: Puck) -> Floats:
     return np.asarray(law.force(one)[0])
 
 
+@pytest.mark.nightly
 def test_a_world_is_its_seed_alone() -> None:
     asked = Asked(4, "none")
     one, again = (scene.conceal(TASK, asked) for _ in range(2))
