@@ -288,7 +288,7 @@ def at_work(
     as laws on joints have (`simulation/sizes.py`).
     """
     sizes = Visited(simulator, point.values, likelihood.inputs + point.launch, likelihood.time_s).joint_sizes()
-    forces = [sizes[name].force / sizes[name].inertia if name in sizes else 0.0 for name in (s.name for s in sites)]
+    forces = [sizes[s.name].force / sizes[s.name].inertia if s.name in sizes else 0.0 for s in sites]
     return np.maximum(moving, np.array(forces)[site_of])
 
 

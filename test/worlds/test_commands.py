@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ from compass_ros.worlds.scenes import scene_of
 from compass_ros.worlds.world import Asked, World
 from test.worlds.task import task_of
 
+STRIBECK = Asked(6, "one", ("stribeck_curve",))
+
 
 def world(cell: str, asked: Asked) -> World:
     scene = scene_of(cell)
@@ -32,17 +35,18 @@ def values(episode: Episode) -> list[bytes]:
 
 @pytest.mark.nightly
 def test_a_table_that_is_told_what_it_draws_gives_the_same_bits() -> None:
-    drawn = world("air_hockey", Asked(5, "none"))
+    drawn = world("air_hockey", Asked(5, "one"))
     shots = np.array([[*e.action.values()] for e in drawn.episodes])
-    told = world("air_hockey", Asked(5, "none", commands=shots))
+    told = world("air_hockey", Asked(5, "one", commands=shots))
     assert told.answer == drawn.answer
     assert [values(e) for e in told.episodes] == [values(e) for e in drawn.episodes]
 
 
-def test_an_arm_that_is_told_what_it_draws_gives_the_same_bits() -> None:
-    drawn = world("two_joint_arm_driven", Asked(6, "none"))
+@pytest.mark.parametrize("asked", [Asked(6, "none"), pytest.param(STRIBECK, marks=pytest.mark.nightly)])
+def test_an_arm_that_is_told_what_it_draws_gives_the_same_bits(asked: Asked) -> None:
+    drawn = world("two_joint_arm_driven", asked)
     targets = np.stack([e.inputs[0].value for e in drawn.episodes])
-    told = world("two_joint_arm_driven", Asked(6, "none", commands=targets))
+    told = world("two_joint_arm_driven", replace(asked, commands=targets))
     assert told.answer == drawn.answer
     assert [values(e) for e in told.episodes] == [values(e) for e in drawn.episodes]
 
