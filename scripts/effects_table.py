@@ -11,7 +11,7 @@ from pathlib import Path
 from compass_ros.reporting.markdown import replace_between
 from compass_ros.simulation.effects import EFFECTS, Effect, Quantity
 from compass_ros.simulation.extents import unit_sizes
-from compass_ros.simulation.sites import SIGNALS, SINGLE_DRIVES, SiteKind, in_words
+from compass_ros.simulation.site_kinds import SIGNALS, SINGLE_DRIVES, SiteKind, in_words
 
 PAGE = Path(__file__).parents[1] / "docs" / "effects.md"
 BEGIN, END = "<!-- table: begin -->\n", "<!-- table: end -->\n"

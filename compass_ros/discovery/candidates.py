@@ -12,7 +12,8 @@ from compass_ros.discovery.unlisted import unlisted
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached, Effect, Quantity
 from compass_ros.simulation.rotors import actuated
-from compass_ros.simulation.sites import DRIVES, JOINTS, PLANAR, SIGNALS, SiteKind, names_of
+from compass_ros.simulation.site_kinds import DRIVES, JOINTS, PLANAR, SIGNALS, SiteKind
+from compass_ros.simulation.sites import names_of
 from compass_ros.simulation.sizes import JointSize, alike
 from compass_ros.simulation.visited import Visited
 from compass_ros.types import Bools, Floats

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compass_ros.discovery.response import Response
-from compass_ros.simulation.sites import PLANAR
+from compass_ros.simulation.site_kinds import PLANAR
 from compass_ros.types import Floats
 
 CELL_M = 0.05

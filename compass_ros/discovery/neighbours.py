@@ -17,7 +17,8 @@ from compass_ros.discovery.race import race
 from compass_ros.discovery.scatter import ranked_scatter, with_scatter
 from compass_ros.discovery.settings import SLIGHT
 from compass_ros.simulation.effects import Attached
-from compass_ros.simulation.sites import PLANAR, Site
+from compass_ros.simulation.site_kinds import PLANAR
+from compass_ros.simulation.sites import Site
 from compass_ros.types import Floats
 
 RACED = 4

@@ -18,7 +18,7 @@ from compass_ros.cells import Cell
 from compass_ros.discovery.settings import KEPT
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.numerics import CONTACTS, creeping
-from compass_ros.simulation.sites import JOINTS
+from compass_ros.simulation.site_kinds import JOINTS
 from compass_ros.types import Floats, Ints
 
 SOFTER = (0.5, 0.0)

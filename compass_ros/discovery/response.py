@@ -20,7 +20,8 @@ from compass_ros.simulation.effects import Attached
 from compass_ros.simulation.extents import along
 from compass_ros.simulation.kicks import Kicks, inertias, kicks
 from compass_ros.simulation.simulator import in_chunks
-from compass_ros.simulation.sites import JOINTS, PLANAR, Site
+from compass_ros.simulation.site_kinds import JOINTS, PLANAR
+from compass_ros.simulation.sites import Site
 from compass_ros.simulation.visited import Visited
 from compass_ros.types import Floats, Ints
 

@@ -10,7 +10,8 @@ from compass_ros.cells.signals import Signal
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, Effect
 from compass_ros.simulation.extents import PairSize
-from compass_ros.simulation.sites import PAIRS, Places, Site, SiteKind
+from compass_ros.simulation.site_kinds import PAIRS, SiteKind
+from compass_ros.simulation.sites import Places, Site
 from compass_ros.simulation.visited import Visited
 
 PAIRS_ASKED = 12

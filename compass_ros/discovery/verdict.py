@@ -21,7 +21,8 @@ from compass_ros.discovery.words import DEPENDS, corrected, errors, missing, pla
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.simulation.replay import rms_distance
-from compass_ros.simulation.sites import Site, any_slides, word_of
+from compass_ros.simulation.site_kinds import word_of
+from compass_ros.simulation.sites import Site, any_slides
 from compass_ros.types import (
     GENERAL,
     EffectFinding,

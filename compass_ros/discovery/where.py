@@ -10,7 +10,7 @@ from compass_ros.discovery.kernels import Shared, shared
 from compass_ros.discovery.maps import in_plane
 from compass_ros.discovery.response import Response
 from compass_ros.discovery.settings import FREE
-from compass_ros.simulation.sites import JOINTS
+from compass_ros.simulation.site_kinds import JOINTS
 from compass_ros.types import DependsOn, Floats, Interval, Region, Where
 
 HELD, WIDE = 0.9, 0.6

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from compass_ros.simulation.sites import DRIVES, JOINTS, PAIRS, SIGNALS, Site, SiteKind
+from compass_ros.simulation.site_kinds import DRIVES, JOINTS, PAIRS, SIGNALS, SiteKind
+from compass_ros.simulation.sites import Site
 from compass_ros.simulation.sizes import COMMAND_UNITS, MODEST, SAMPLES, DriveSize, JointSize, unit_joint
 from compass_ros.types import Floats
 

@@ -19,7 +19,8 @@ from compass_ros.simulation.effects.attached import Attached
 from compass_ros.simulation.effects.effect import Context, Sample, restore, table_friction
 from compass_ros.simulation.native.program import Term
 from compass_ros.simulation.sensing import link, through
-from compass_ros.simulation.sites import Places, Site, SiteKind
+from compass_ros.simulation.site_kinds import SiteKind
+from compass_ros.simulation.sites import Places, Site
 from compass_ros.types import Bools, Floats, Ints, Parameter
 
 Acting = tuple[Attached, Floats, tuple[Site, ...]]

@@ -13,7 +13,8 @@ import mujoco
 import numpy as np
 
 from compass_ros.cells.inertia import mass_diagonal
-from compass_ros.simulation.sites import OF_JOINT, ONE_DOF, SPEED_DRIVES, Site, SiteKind
+from compass_ros.simulation.site_kinds import SPEED_DRIVES, SiteKind
+from compass_ros.simulation.sites import OF_JOINT, ONE_DOF, Site
 from compass_ros.types import Floats
 
 MODEST, LARGEST = 0.02, 2.0

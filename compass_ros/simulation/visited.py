@@ -22,7 +22,8 @@ from compass_ros.simulation.extents import (
     standing,
 )
 from compass_ros.simulation.simulator import Simulator
-from compass_ros.simulation.sites import JOINTS, Site, SiteKind
+from compass_ros.simulation.site_kinds import JOINTS, SiteKind
+from compass_ros.simulation.sites import Site
 from compass_ros.simulation.sizes import DriveSize, JointSize, command_unit, joint_sizes, largest_forces
 from compass_ros.simulation.touching import touching
 from compass_ros.types import Floats

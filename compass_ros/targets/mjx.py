@@ -18,7 +18,8 @@ from compass_ros.simulation.effects import Exported, FittedEffect
 from compass_ros.simulation.effects.attach import context_in
 from compass_ros.simulation.effects.effect import RESTORED, table_friction
 from compass_ros.simulation.native.program import SLIDING, Kind, Term
-from compass_ros.simulation.sites import JOINTS, PLANAR, Places
+from compass_ros.simulation.site_kinds import JOINTS, PLANAR
+from compass_ros.simulation.sites import Places
 from compass_ros.targets.said import Said
 from compass_ros.types import Floats
 

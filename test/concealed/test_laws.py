@@ -11,7 +11,7 @@ from compass_ros.concealed.library import FORMS, along, in_library_terms
 from compass_ros.concealed.table import Played
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
-from compass_ros.simulation.sites import PAIRS
+from compass_ros.simulation.site_kinds import PAIRS
 from compass_ros.types import Floats
 from test.concealed.scene import INPUTS, TIMES, cell, distance, ingredient, table, tracks
 from test.discovery.planted import asked_of_table

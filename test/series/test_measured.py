@@ -12,7 +12,7 @@ from compass_ros.cells.drives import Drive
 from compass_ros.errors import ConfigError
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS
-from compass_ros.simulation.sites import DRIVES
+from compass_ros.simulation.site_kinds import DRIVES
 
 LAG_S = {"velocity": 0.002, "position": 0.0028284 - 0.0005}
 """Mass over gain of a velocity servo; damping over stiffness of a position servo, which is told the mean of a step and

@@ -8,7 +8,8 @@ import pytest
 
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.effects import EFFECTS, Attached, effect
-from compass_ros.simulation.sites import DRIVES, JOINTS, MOVING, PLANAR, Places, Site, SiteKind, in_words
+from compass_ros.simulation.site_kinds import DRIVES, JOINTS, MOVING, PLANAR, SiteKind, in_words
+from compass_ros.simulation.sites import Places, Site
 from test.simulation.table import attached, on_table, simulator
 
 EFFORT: tuple[SiteKind, ...] = ("effort_drive",)

@@ -8,7 +8,8 @@ import numpy as np
 
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.effects.effect import Effect
-from compass_ros.simulation.sites import Places, Site, in_words
+from compass_ros.simulation.site_kinds import in_words
+from compass_ros.simulation.sites import Places, Site
 from compass_ros.types import Bools, Floats, Parameter
 
 

@@ -6,7 +6,7 @@ observed(t) = true(t (1 + rate)). Source: rate error of a free-running clock.
 from __future__ import annotations
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity, Sample
-from compass_ros.simulation.sites import SIGNALS
+from compass_ros.simulation.site_kinds import SIGNALS
 from compass_ros.types import Floats
 
 

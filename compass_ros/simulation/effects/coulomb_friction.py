@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity, friction
 from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.simulation.sites import JOINTS, LYING
+from compass_ros.simulation.site_kinds import JOINTS, LYING
 from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize
 from compass_ros.types import Floats
 

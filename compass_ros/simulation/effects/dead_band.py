@@ -14,7 +14,8 @@ import numpy as np
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.simulation.sites import SPEED_DRIVES, Site
+from compass_ros.simulation.site_kinds import SPEED_DRIVES
+from compass_ros.simulation.sites import Site
 from compass_ros.simulation.sizes import DriveSize
 from compass_ros.types import Floats
 

@@ -13,7 +13,8 @@ from compass_ros.cells.dynamics import Sliding
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.extents import BodySize, PairSize, SignalSize, Size
 from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.simulation.sites import JOINTS, MOVING, PAIRS, Places, Site, SiteKind
+from compass_ros.simulation.site_kinds import JOINTS, MOVING, PAIRS, SiteKind
+from compass_ros.simulation.sites import Places, Site
 from compass_ros.simulation.sizes import DriveSize, JointSize
 from compass_ros.types import Channel, Floats
 

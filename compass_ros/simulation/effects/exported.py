@@ -19,7 +19,7 @@ from compass_ros.simulation.effects.effect import Effect
 from compass_ros.simulation.effects.parameter import in_unit
 from compass_ros.simulation.effects.registry import effect
 from compass_ros.simulation.extents import unit_sizes
-from compass_ros.simulation.sites import SiteKind
+from compass_ros.simulation.site_kinds import SiteKind
 
 _strict = ConfigDict(extra="forbid", allow_inf_nan=False)
 

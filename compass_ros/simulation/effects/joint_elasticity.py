@@ -17,7 +17,7 @@ import numpy as np
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.rotors import onto_rotor, rotorless
-from compass_ros.simulation.sites import JOINTS
+from compass_ros.simulation.site_kinds import JOINTS
 from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize, unit_joint
 from compass_ros.types import Floats
 

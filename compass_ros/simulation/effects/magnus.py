@@ -12,7 +12,7 @@ import numpy as np
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.extents import BodySize
 from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.simulation.sites import PLANAR
+from compass_ros.simulation.site_kinds import PLANAR
 from compass_ros.simulation.sizes import LARGEST, MODEST
 from compass_ros.types import Floats
 

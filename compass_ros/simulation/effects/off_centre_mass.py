@@ -11,7 +11,8 @@ import mujoco
 import numpy as np
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
-from compass_ros.simulation.sites import PLANAR, Site
+from compass_ros.simulation.site_kinds import PLANAR
+from compass_ros.simulation.sites import Site
 from compass_ros.types import Floats
 
 

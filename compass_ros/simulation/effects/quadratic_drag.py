@@ -9,7 +9,7 @@ from __future__ import annotations
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.extents import BodySize
 from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.simulation.sites import MOVING
+from compass_ros.simulation.site_kinds import MOVING
 from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize
 from compass_ros.types import Floats
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
-from compass_ros.simulation.sites import SPEED_DRIVES
+from compass_ros.simulation.site_kinds import SPEED_DRIVES
 from compass_ros.types import Floats
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.simulation.sites import PLANAR
+from compass_ros.simulation.site_kinds import PLANAR
 from compass_ros.types import Floats
 
 

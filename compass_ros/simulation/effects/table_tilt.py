@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.native.program import Kind, Term
-from compass_ros.simulation.sites import LYING
+from compass_ros.simulation.site_kinds import LYING
 from compass_ros.types import Floats
 
 

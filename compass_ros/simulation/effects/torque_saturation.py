@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
-from compass_ros.simulation.sites import SINGLE_DRIVES
+from compass_ros.simulation.site_kinds import SINGLE_DRIVES
 from compass_ros.simulation.sizes import DriveSize
 from compass_ros.types import Floats
 

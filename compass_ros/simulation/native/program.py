@@ -14,7 +14,8 @@ import numpy as np
 
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.native.compiled import compiled_forces
-from compass_ros.simulation.sites import DRIVES, JOINTS, PLANAR, Site
+from compass_ros.simulation.site_kinds import DRIVES, JOINTS, PLANAR
+from compass_ros.simulation.sites import Site
 from compass_ros.types import Floats
 
 NUMBERS = 8

@@ -12,7 +12,7 @@ from compass_ros.discovery.candidates import candidates
 from compass_ros.discovery.first_order import FirstOrder
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, Exported, FittedEffect, attach, effect, read_effects, write_effects
-from compass_ros.simulation.sites import SiteKind
+from compass_ros.simulation.site_kinds import SiteKind
 from compass_ros.simulation.sizes import JointSize, unit_joint
 from compass_ros.simulation.visited import Visited
 from compass_ros.types import Floats
