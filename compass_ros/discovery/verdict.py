@@ -120,15 +120,20 @@ class Judge:
         where = whereabouts(self.found.plain.response, self.found.plain.free)
         sentence = f"{place(where, self._flat)}, something differs that no known law explains"
         sentence += DEPENDS[where.depends_on]
-        if self.found.models:
-            _, unknown, of_models = self.found.probabilities
-            best, plain = self.found.models[0], self.found.plain
-            was, now = plain.chi_square**0.5, best.chi_square**0.5
-            left = f"leaves {now:.1f} of {was:.1f} times the noise in fitted episodes"
-            name = name_of(best.physics)
-            sentence += f" (probability {unknown:.2f}; the best law, {name}, has {of_models[0]:.2g} and {left})"
+        _, unknown, of_models = self.found.probabilities
+        sentence += f" (probability {unknown:.2f}{self._best_law(of_models)})"
         before = f"held-out error {1e3 * self._before:.2f} {unit}, floor {1e3 * self._floor:.2f} {unit}"
         return self._said("unknown", f"{sentence}; {before}.", self._of_discrepancy(where))
+
+    def _best_law(self, of_models: Floats) -> str:
+        """What the most probable model leaves, where it is less than what is left without."""
+        best = self.found.models[0] if self.found.models else self.found.plain
+        was, now = (f"{model.chi_square**0.5:.1f}" for model in (self.found.plain, best))
+        if float(now) >= float(was):
+            return ""
+        has = f"{of_models[0]:.2g}" if of_models[0] >= 0.001 else "less than 0.001"
+        left = f"leaves {now} of {was} times the noise in fitted episodes"
+        return f"; the best law, {name_of(best.physics)}, has {has} and {left}"
 
     def _of_discrepancy(self, where: Where) -> Where:
         """With the site of a discrepancy that no law explains."""
