@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 
 MISSING = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
 NARROW = "\N{NARROW NO-BREAK SPACE}"
+_NEGATIVE = re.compile(r"(?<![\w.)-])-(?=\d)|(?<=\de)-(?=\d)")
+"""The sign of a number or of its exponent; in `2026-11-29` and `unit-3` there is none."""
 
 
 def plain(value: float, digits: int = 4) -> str:
@@ -79,8 +82,9 @@ def duration(seconds: float) -> str:
 
 
 def typeset(sentence: str) -> str:
-    """A sentence with the signs that plain text spells out: `+-`, `->`, `m/s2`."""
-    return sentence.replace("+-", "±").replace("->", "→").replace("m/s2", "m/s²").replace("m/s^2", "m/s²")
+    """A sentence with the signs that plain text spells out: `+-`, `->`, `m/s2`, and minus, at which no line breaks."""
+    signed = sentence.replace("+-", "±").replace("->", "→").replace("m/s2", "m/s²").replace("m/s^2", "m/s²")
+    return _NEGATIVE.sub(MINUS, signed)
 
 
 def unit_text(unit: str) -> str:

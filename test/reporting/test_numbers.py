@@ -47,6 +47,7 @@ def test_small_probabilities_are_bounds() -> None:
 
 def test_typeset() -> None:
     assert typeset("0.21 +- 0.01 m/s2, 5 -> 1 mm") == "0.21 ± 0.01 m/s², 5 → 1 mm"
+    assert typeset("x -0.5 +- 3e-05 of 2026-11-29 to unit-3") == f"x {MINUS}0.5 ± 3e{MINUS}05 of 2026-11-29 to unit-3"
 
 
 def test_plain_writes_thousands_out() -> None:
