@@ -23,17 +23,22 @@ def unseal(
     answers: Annotated[Path, typer.Option(help="folder of the answers")] = ANSWERS,
 ) -> None:
     """Open the seal of a concealed world, check that nothing was altered, and compare a result with the truth."""
+    from compass_ros.commands import unseal_scene
     from compass_ros.concealed.comparison import compare
     from compass_ros.concealed.seal import unseal as open_seal
     from compass_ros.reporting import read_result
 
     result = _result_of(path)
     opened = open_seal(world or _world_of(path), answers)
+    of_scene = "laws" in opened.answer  # of another engine; else of the table in MuJoCo
     if result is None:
-        typer.echo(f"true: {_truth(opened.answer)}")
+        typer.echo(f"true: {unseal_scene.truth(opened.answer) if of_scene else _truth(opened.answer)}")
         return
     content = read_result(result)
-    show(content, opened.answer, compare(content, opened.answer))
+    if of_scene:
+        unseal_scene.show(content, opened.answer)
+    else:
+        show(content, opened.answer, compare(content, opened.answer))
 
 
 def _result_of(path: Path) -> Path | None:

@@ -100,7 +100,7 @@ def compare(result: Json, answer: Json) -> Comparison:
         held_out_m=_held_out(result, answer),
         left_m=_left(result, answer),
         apart_m=single["nearest"]["left_m"] if kind == "outside" and single and single.get("nearest") else None,
-        ordinary_z=_ordinary(result["parameters"], answer["parameters"]),
+        ordinary_z=ordinary(result["parameters"], answer["parameters"]),
     )
 
 
@@ -197,7 +197,8 @@ def _gain(result: Json, answer: Json) -> float | None:
     return (rms["calibrated"] - rms.get("with_effects", rms["calibrated"])) / (rms["calibrated"] - rms["floor"])
 
 
-def _ordinary(rows: Sequence[Json], truth: Mapping[str, float]) -> float | None:
+def ordinary(rows: Sequence[Json], truth: Mapping[str, float]) -> float | None:
+    """Median distance of identifiable parameters from the truth, in their error bars; None: none is identifiable."""
     z = [
         abs(row["value"] - truth[row["name"]]) / row["std"]
         for row in rows
