@@ -7,7 +7,7 @@ the episodes say it together: they lie farther from what was read than was expec
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from compass_ros.calibration.cost import ROBUST, Point, cost, cost_by_episode, launches_away, start
 from compass_ros.calibration.least_squares import NONE, Fit, minimise
@@ -74,7 +74,7 @@ def unexpected(likelihood: Likelihood, fit: Fit) -> Floats:
     away, unsure = _launches(likelihood, fit)
     told = np.maximum(1 - unsure, _TOLD)
     spread = np.sqrt(np.maximum(np.mean((away / told) ** 2 - unsure / told, axis=0), 0.0))
-    beyond = (np.sum(away**2, axis=0) > chi2.isf(CHANCE, len(away))) & (spread > 1)
+    beyond = (np.sum(away**2, axis=0) > chdtri(len(away), CHANCE)) & (spread > 1)
     return _of_all(likelihood, np.where(beyond, spread, 0.0))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from compass_ros.calibration.encoder import ROOT_12, encoder_step, repeats
 from compass_ros.types import Bools, Floats
@@ -172,7 +172,7 @@ def _pooled(sigma: Floats, freedom: Floats) -> Floats:
     total = float(np.sum(freedom))
     common = float(np.sum(freedom * sigma**2) / total)
     statistic = total * np.log(common) - float(np.sum(freedom * np.log(sigma**2)))
-    alike = statistic < chi2.ppf(_ALIKE, max(len(sigma) - 1, 1))
+    alike = statistic < chdtri(max(len(sigma) - 1, 1), 1 - _ALIKE)
     return np.full(len(sigma), np.sqrt(common)) if alike else sigma
 
 

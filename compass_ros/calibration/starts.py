@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import norm, qmc
+from scipy.special import ndtri
 
 from compass_ros.calibration.cost import ROBUST, Point, cost, start
 from compass_ros.calibration.likelihood import Likelihood
@@ -36,9 +36,11 @@ def lost(likelihood: Likelihood, point: Point) -> bool:
 
 def draws(likelihood: Likelihood, free: Ints, values: Floats) -> Floats:
     """(OTHERS, P) values, those that are free from the prior within its bounds: a scrambled Sobol sequence."""
+    from scipy.stats import qmc  # takes a second to import, and few fits need it
+
     shares = qmc.Sobol(len(free), scramble=True, seed=0).random(OTHERS + 1)[1:]
     out = np.tile(values, (OTHERS, 1))
-    drawn = likelihood.prior_mean[free] + likelihood.prior_std[free] * norm.ppf(shares)
+    drawn = likelihood.prior_mean[free] + likelihood.prior_std[free] * ndtri(shares)
     out[:, free] = np.clip(drawn, likelihood.low[free], likelihood.high[free])
     return out
 

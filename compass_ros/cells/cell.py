@@ -170,10 +170,13 @@ class Cell:
 
     def index(self, parameter: str) -> int:
         """Position of a parameter. Raises ConfigError with the nearest known name."""
-        names = [p.name for p in self.parameters]
-        if parameter not in names:
-            raise ConfigError(f"{self.name}: unknown parameter '{parameter}'{nearest(parameter, names)}")
-        return names.index(parameter)
+        if parameter not in self._places:
+            raise ConfigError(f"{self.name}: unknown parameter '{parameter}'{nearest(parameter, list(self._places))}")
+        return self._places[parameter]
+
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {parameter.name: i for i, parameter in enumerate(self.parameters)}
 
     def values(self, given: Mapping[str, float], where: str = "parameters") -> Floats:
         """(P,) the defaults with the given ones in place. Raises ConfigError for unknown names and for bad values."""

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 from scipy.spatial.transform import Rotation
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from compass_ros.cells.series import Name
 from compass_ros.cells.signals import Signal
@@ -220,7 +220,7 @@ def _form_error(spec: StartSpec, signal: Signal, episode: Episode, noise: float)
     scatter = np.sum((linear - np.vander(time, numbers, increasing=True) @ fit) ** 2, axis=0) / free
     cubic = np.abs(_through(time, linear, 4)[:2] - fit[:2]) if len(time) >= 5 else np.zeros_like(fit[:2])
     of_scatter = _gain(time)[:, None] * np.sqrt(scatter)
-    none = scatter > noise**2 * chi2.isf(CHANCE, free) / free  # (d,) where no polynomial goes through
+    none = scatter > noise**2 * chdtri(free, CHANCE) / free  # (d,) where no polynomial goes through
     error = np.where(none, FORM * np.maximum(cubic, of_scatter), cubic if len(time) >= 6 else 0.0)
     first, size = positions_in_state(signal), linear.shape[1]
     out[:size] = 0.0 if episode.initial_state.get(spec.object) else error[0]

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import pearsonr
 
 from compass_ros.cells import Cell
 from compass_ros.cells.scene_source import missing_meshes
@@ -81,6 +80,8 @@ def _shaking(names: Sequence[str], episodes: Sequence[Episode]) -> str:
         of_one, of_other = np.concatenate([np.zeros((2, 0)), *scatter], axis=1)
         if not of_one.any() or not of_other.any():
             continue
+        from scipy.stats import pearsonr  # takes a second to import
+
         common = pearsonr(of_one, of_other, alternative="greater")
         if common.statistic > _COMMON and common.pvalue < _CHANCE:
             size = 1e3 * float(np.sqrt(common.statistic) * np.sqrt(of_one.std() * of_other.std()))

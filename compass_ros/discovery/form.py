@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.hypothesis import Hypothesis
@@ -65,7 +65,7 @@ def _less(known: Known, model: Hypothesis) -> Hypothesis | None:
 def at_noise(model: Hypothesis) -> bool:
     """Whether the mean square of what a fit leaves is one that the noise itself exceeds with probability SLIGHT."""
     independent = model.likelihood.measurements / model.likelihood.correlation_time
-    return bool(model.chi_square * independent <= chi2.isf(SLIGHT, independent))
+    return bool(model.chi_square * independent <= chdtri(independent, SLIGHT))
 
 
 def left_over(model: Hypothesis) -> float:

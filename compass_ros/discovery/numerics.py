@@ -45,7 +45,9 @@ def shorter_step(plain: Hypothesis, best: float, threshold: float) -> float | No
 
     What a step does to first order is a nuisance of every model. A glancing contact is another one with another step:
     of such, halving the step does not foretell what a quarter of it does (`finite_step`: three quarters of all). Where
-    that is wrong by less than the `threshold` of log odds, nothing is fitted.
+    that is wrong by less than the `threshold` of log odds, nothing is fitted; nor where it does too little: at an
+    optimum a change m of the residual r lowers half its square by -r m at most to first order, whatever parameters then
+    do, and so by |r| |m| (Cauchy and Schwarz), each weighted as in the robust loss.
     """
     simulator, likelihood, fit = plain.simulator, plain.likelihood, plain.fit
     residual, step = fit.linear.residual, SHORTER * simulator.time_step
@@ -53,6 +55,9 @@ def shorter_step(plain: Hypothesis, best: float, threshold: float) -> float | No
     foretold = (1 - SHORTER) * finite_step(simulator, likelihood, fit.point, residual)
     kappa = likelihood.correlation_time
     if 0.5 * float(np.sum((moved - foretold) ** 2)) / kappa < threshold:
+        return None
+    weighted = np.sqrt(robust_weight(residual, fit.robust))
+    if float(np.linalg.norm(weighted * residual) * np.linalg.norm(weighted * moved)) / kappa <= best:
         return None
     finer = Simulator(replace(simulator.cell, time_step=step), threads=simulator.threads)
     finer = finer.driven(simulator.physics.bank)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc, chdtri
 
 from compass_ros.calibration.least_squares import Fit, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
@@ -60,7 +60,7 @@ class Zero:
         """Whether zero is in the region of that confidence of all amplitudes of some laws together. Of two that do
         nearly the same, each may be zero beside the other, and both may not."""
         squared, amplitudes = self._distance(laws)
-        return bool(squared < chi2.ppf(chi2.cdf(ERROR_BARS**2, 1), amplitudes))
+        return bool(squared < chdtri(amplitudes, chdtrc(1, ERROR_BARS**2)))
 
     def _nearest(self, choices: Sequence[Sequence[Attached]]) -> tuple[Attached, ...]:
         may = sorted((laws for laws in choices if self.may_lack(laws)), key=lambda laws: self._distance(laws)[0])

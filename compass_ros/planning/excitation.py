@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import cma
 import numpy as np
 
 from compass_ros.calibration.cost import start
@@ -157,6 +156,8 @@ def plan_motions(
         search.look(numbers)
         total = count / ORDINARY * np.sum(search.information, axis=0)
         known = shown(simulator, "by chance, around home", count * search.seconds, total), total
+    import cma  # with matplotlib, a second of every other command
+
     strategy = cma.CMAEvolutionStrategy(
         np.zeros(size(driven)), 1.0, {"seed": seed + 1, "popsize": POPULATION, "verbose": -9}
     )
