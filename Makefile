@@ -46,7 +46,8 @@ demo: install
 # Nodes wait for each other most of the time: all else runs beside them, behind them in rank, or they would be late. Linear
 # algebra must not start threads of its own.
 test: export OMP_NUM_THREADS = 1
-test: install readers
+test:
+	$(MAKE) --no-print-directory --jobs 2 install readers
 	$(BIN)/ruff check .
 	$(MAKE) --no-print-directory --jobs 3 --keep-going nodes types core
 
@@ -88,7 +89,7 @@ $(READERS)/node_modules/.package-lock.json: $(READERS)/package-lock.json
 
 $(RERUN)/.installed: $(READERS)/requirements.txt
 	$(PYTHON) -m venv $(RERUN)
-	$(RERUN)/bin/python -m pip install --quiet --disable-pip-version-check -r $<
+	$(RERUN)/bin/python -m pip install --quiet --disable-pip-version-check --no-compile -r $<
 	@touch $@
 
 # The documentation as a site in out/site; once its environment is there, no network is needed.
@@ -161,7 +162,7 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(STAMPS)/locked: requirements.lock | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -r requirements.lock
 	@mkdir -p $(STAMPS) && touch $@
 
 # Editable, so that the sources are what runs. An editable install compiles the native library beside its source, but

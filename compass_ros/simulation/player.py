@@ -76,7 +76,7 @@ class Player:
 
 
 def _copied(scene: mujoco.MjModel) -> mujoco.MjModel:
-    """A model to write into. What is one tree is one island: MuJoCo need not look for them, a fifth of an arm's step."""
+    """A model to write into. One tree is one island: MuJoCo need not look for them, a fifth of an arm's step."""
     model = copy.copy(scene)
     if model.ntree == 1:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND

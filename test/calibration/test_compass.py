@@ -101,6 +101,7 @@ def test_cancelling_returns_what_there_is() -> None:
     assert found.values.tobytes() == min(found.trace, key=lambda t: float(t.difference.mean())).values.tobytes()
 
 
+@pytest.mark.nightly
 def test_a_factor_that_never_differs_has_no_edge() -> None:
     world = planted(4, 2, seed=5)
 

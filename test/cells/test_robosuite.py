@@ -25,6 +25,7 @@ from compass_ros.simulation.factors import factor_distance
 from compass_ros.simulation.robosuite_env import DoubleBouncingBall, MiniAirHockey, PushI
 from compass_ros.simulation.robosuite_env.cell_env import CellEnv
 from compass_ros.types import Floats
+from test.by_night import but
 
 pytestmark = pytest.mark.slow
 
@@ -56,7 +57,7 @@ def fast(env: CellEnv, values: Floats, actions: Floats) -> Floats:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", but((0, 1, 2), 0))
 def test_an_arm_plays_the_shot_that_the_fast_path_plays(env: CellEnv, seed: int) -> None:
     values, action = drawn(env, seed)
     played, nominal = env.play(values, action), fast(env, env.cell.defaults, action[None])[0]

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from compass_ros.cli import app
 from compass_ros.commands.unseal_scene import show
+from compass_ros.errors import BagError
 
 FRICTION = {
     "name": "lugre_friction",
@@ -84,6 +85,7 @@ def test_a_wrong_name_and_a_right_silence_are_marked(
     assert "verdict none nothing is missing right" in shown(capsys, result("none"), answer())
 
 
+@pytest.mark.slow
 def test_a_world_alone_says_what_is_true_of_it(tmp_path: Path) -> None:
     world, answers = tmp_path / "world", tmp_path / "answers"
     runner = CliRunner()
@@ -93,3 +95,8 @@ def test_a_world_alone_says_what_is_true_of_it(tmp_path: Path) -> None:
     assert told.exit_code == 0, told.output
     assert told.stdout.startswith("true: ")
     assert "times the noise" in told.stdout or "nothing is missing" in told.stdout
+    taken = runner.invoke(app, asked)
+    assert "is not empty" in str(taken.exception)
+    next(answers.glob("*.json")).unlink()
+    gone = runner.invoke(app, ["unseal", str(world), "--answers", str(answers)])
+    assert isinstance(gone.exception, BagError)

@@ -16,7 +16,7 @@ from test.discovery.servo import START, as_episodes
 
 def arm(folder: Path) -> Cell:
     """Two links on geared position servos, one message of encoders; friction, rotors and gains are tuned."""
-    scene = """<mujoco><option timestep="0.001" integrator="implicitfast"/><worldbody>
+    scene = """<mujoco><option timestep="0.002" integrator="implicitfast"/><worldbody>
       <body name="upper"><joint name="s" axis="0 1 0" damping="0.1" armature="0.02" frictionloss="0.02"/>
         <inertial pos="0 0 -0.15" mass="0.8" diaginertia="4e-3 4e-3 1e-3"/>
         <body name="fore" pos="0 0 -0.3">
@@ -106,7 +106,7 @@ def pushes(count: int, seed: int = 5) -> Floats:
 
 def foot(folder: Path) -> Cell:
     """A foot on a pad that a servo lifts, slower or faster; its friction and mass are tuned."""
-    scene = """<mujoco><option timestep="0.001"/><worldbody>
+    scene = """<mujoco><option timestep="0.002"/><worldbody>
       <geom name="pad" type="box" size=".2 .2 .02" pos="0 0 -.02"/>
       <body name="leg" pos="0 0 .05"><joint name="lift" type="slide" axis="0 0 1" damping="1"/>
       <geom name="foot" size=".05" mass=".3"/></body></worldbody>

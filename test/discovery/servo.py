@@ -21,7 +21,7 @@ TRUTH = {"axis@dyna@damping": 0.12, "axis@dyna@armature": 0.02}
 
 def servo(folder: Path, force: float = 1.0, dry: float = 0.0) -> Cell:
     """A bar on a hinge under a position servo; `force`: newton metres in units of force; `dry` friction [N m]."""
-    scene = f"""<mujoco><option timestep="0.001" integrator="implicitfast"/><worldbody>
+    scene = f"""<mujoco><option timestep="0.002" integrator="implicitfast"/><worldbody>
         <body name="horn"><joint name="axis" axis="0 1 0" damping="{0.1 * force}" armature="{0.018 * force}"
         frictionloss="{dry * force}"/>
         <geom type="box" size="0.1 0.01 0.005" pos="0.1 0 0" mass="{0.1 * force}"/></body></worldbody>

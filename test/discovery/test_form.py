@@ -30,7 +30,7 @@ def on(joint: str, name: str) -> Attached:
 
 def fitted(folder: Path, laws: list[Attached], numbers: list[float], beyond: float) -> Hypothesis:
     """The model of two swinging joints that has the laws, at their true numbers; what is recorded also has `beyond`."""
-    cell = robots.robot(folder, ("hinge", "hinge"))
+    cell = robots.robot(folder, ("hinge", "hinge"), step_ms=2.0)
     plain, inputs = Simulator(cell, threads=1), robots.shots(cell, 4)
     likelihood = robots.recorded(plain, [*laws, on("j0", "viscous_drag")], [*numbers, beyond], inputs)
     simulator, likelihood = widened(plain, likelihood, laws)

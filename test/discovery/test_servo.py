@@ -99,7 +99,7 @@ def test_two_laws_on_a_servo_are_both_named(tmp_path: Path) -> None:
 def test_a_law_on_one_joint_of_an_arm_is_named_on_that_joint(
     tmp_path: Path, joints: tuple[str, ...], drives: tuple[str, ...], law: str, on: str, numbers: list[float]
 ) -> None:
-    cell = robots.robot(tmp_path, joints, drives)
+    cell = robots.robot(tmp_path, joints, drives, step_ms=2.0)
     kind = joints[int(on[1:])] if on else "hinge"
     laws = [Attached(effect(law).at(unit_joint(kind)), (on,))] if law else []  # type: ignore[arg-type]
     slow = [0.3 if a.name[0] == "v" else 1.0 for a in cell.action]

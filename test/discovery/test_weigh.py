@@ -70,7 +70,7 @@ def test_a_push_at_a_moment_is_unknown_and_on_its_joint(tmp_path: Path) -> None:
 
 def plain(folder: Path, seed: int) -> Hypothesis:
     """An arm that swings, with white noise, at the fit of a simulator that lacks nothing."""
-    cell = robots.robot(folder, ("hinge", "hinge"))
+    cell = robots.robot(folder, ("hinge", "hinge"), step_ms=2.0)
     simulator, inputs = Simulator(cell, threads=1), robots.shots(cell, 4)
     likelihood = robots.recorded(simulator, [], [], inputs)
     noise = np.random.default_rng(seed).normal(0, 1, likelihood.measured.shape) * likelihood.sigma

@@ -70,7 +70,7 @@ def test_a_sealed_world() -> None:
     assert marks["held_out_m"]["calibrated"] < 0.4 * marks["held_out_m"]["nominal"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_conceal_and_unseal_as_a_user_types_them(tmp_path: Path) -> None:
     world, answers = tmp_path / "world", tmp_path / "answers"
     asked = ("--seed", "4", "--effect", "off_centre_mass", "--rms", "3e-3", "--noise", "tracker")

@@ -10,15 +10,16 @@ import pytest
 from compass_ros.rivals.accelerations import accelerations, in_flight
 from compass_ros.rivals.calibrated import rms
 from compass_ros.rivals.sparse_regression import optimisers, regress, residual_accelerations, sparse_regression
+from test.by_night import but
 from test.rivals.planted import played
 
 BOTH = ("puck1", "puck2")
 
 
-@pytest.mark.parametrize(
-    ("name", "numbers"),
-    [("viscous_drag", [0.04]), ("quadratic_drag", [0.1]), ("table_tilt", [0.002, -0.001]), ("magnus", [0.1])],
-)
+PLANTED = (("viscous_drag", [0.04]), ("quadratic_drag", [0.1]), ("table_tilt", [0.002, -0.001]), ("magnus", [0.1]))
+
+
+@pytest.mark.parametrize(("name", "numbers"), but(PLANTED, PLANTED[0], PLANTED[3]))
 def test_a_planted_force_is_named(name: str, numbers: list[float]) -> None:
     given = played([(name, BOTH, numbers)], sigma=2e-5)
     model = sparse_regression(given, windows_s=(0.2, 0.3))
