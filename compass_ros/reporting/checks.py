@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from compass_ros.reporting.numbers import probability, with_unit
 from compass_ros.reporting.words import (
@@ -64,7 +65,7 @@ def assess(result: Result) -> tuple[Check, ...]:
         *_at_bounds(result),
         *_verdict(result),
         *_effects_predict(result),
-        *(Check("note", "Left out", f"{one.bag}: {one.reason}") for one in result.left_out),
+        *_left_out(result),
         *(Check("care", "Warning", warning) for warning in result.warnings),
         *_blind_spots(result),
     )
@@ -81,6 +82,18 @@ def _stopped(result: Result) -> Iterator[Check]:
         yield Check("bad", "Stopped early", "The calibration was cancelled; these are the values it had by then.")
     if not result.held_out:
         yield Check("bad", "Nothing held out", "Every episode was fitted; nothing shows how well others are predicted.")
+
+
+def _left_out(result: Result) -> Iterator[Check]:
+    """Recordings that could not be used, those with one reason together."""
+    bags: dict[str, dict[Path, list[str]]] = {}
+    for one in result.left_out:
+        path = Path(one.bag)
+        bags.setdefault(one.reason, {}).setdefault(path.parent, []).append(path.name)
+    for reason, by_folder in bags.items():
+        for folder, names in by_folder.items():
+            title = "Left out" if len(names) == 1 else f"{len(names)} left out"
+            yield Check("note", title, f"{folder / names[0]}{''.join(f', {name}' for name in names[1:])}: {reason}")
 
 
 def _floor(result: Result) -> Iterator[Check]:

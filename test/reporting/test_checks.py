@@ -9,7 +9,7 @@ from typing import get_args
 import pytest
 
 from compass_ros.reporting.checks import assess, overall
-from compass_ros.types import Gap, Result, Together, Verdict
+from compass_ros.types import Gap, LeftOut, Result, Together, Verdict
 
 
 def titles(result: Result, *levels: str) -> list[str]:
@@ -111,3 +111,14 @@ def test_a_likely_false_alarm_needs_care(clean: Result, make_result: Callable[[V
     doubtful = replace(named.effects[0], evidence=replace(named.effects[0].evidence, false_alarm_p=0.2))
     assert overall(assess(replace(clean, mismatch=named))) == "good"
     assert overall(assess(replace(clean, mismatch=replace(named, effects=(doubtful,))))) == "care"
+
+
+def test_recordings_left_out_for_one_reason_stand_together(clean: Result) -> None:
+    why = "start: nothing moves"
+    left = (LeftOut("w/a", why), LeftOut("w/b", why), LeftOut("w/c", "no clock"), LeftOut("x/d", why))
+    notes = [(c.title, c.detail) for c in assess(replace(clean, left_out=left)) if "left out" in c.title.lower()]
+    assert notes == [
+        ("2 left out", "w/a, b: start: nothing moves"),
+        ("Left out", "x/d: start: nothing moves"),
+        ("Left out", "w/c: no clock"),
+    ]
