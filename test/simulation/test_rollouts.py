@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 
 from benchmarks.rollouts import compare
+from compass_ros.cells import load
 from compass_ros.errors import ConfigError
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
@@ -37,6 +39,29 @@ def test_a_rollout_depends_on_nothing_but_its_own_values() -> None:
     together = simulator().motion(batch, shots, 0.3).positions
     for i in (0, 7, CHUNK - 1, CHUNK, count - 1):
         assert (simulator().motion(batch[i : i + 1], shots[i : i + 1], 0.3).positions[0] == together[i]).all()
+
+
+def test_rollouts_of_the_same_values_share_a_model_and_nothing_else() -> None:
+    """Each as alone, with laws of their own sizes beside them."""
+    dragged = simulator().with_effects([Attached(EFFECTS["viscous_drag"], ("puck1", "puck2"))])
+    two, shots = drawn(2, 2), actions(6)
+    batch = np.concatenate([two[[0, 1, 0, 1, 1, 0]], np.array([[0.1], [0.1], [0.3], [0.1], [0.0], [0.1]])], axis=1)
+    together = dragged.motion(batch, shots, 0.5).positions
+    for i in range(6):
+        assert (dragged.motion(batch[i : i + 1], shots[i : i + 1], 0.5).positions[0] == together[i]).all()
+
+
+def test_one_tree_moves_as_mujoco_moves_it() -> None:
+    """To the bit, with dry friction, though islands are not looked for."""
+    arm = Simulator(load("two_joint_arm"), threads=1)
+    model = arm.physics.model
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = (0.9, -0.4), (0.5, 2.0)
+    begin = np.concatenate([[0.0], data.qpos, data.qvel])
+    states, _ = arm.play(arm.defaults[None], begin[None], None, 400)
+    for state in states[0]:
+        mujoco.mj_step(model, data)
+        np.testing.assert_array_equal(state[1:], np.concatenate([data.qpos, data.qvel]))
 
 
 def test_what_is_observed_is_the_motion_at_those_times_held_before_and_after() -> None:
