@@ -211,6 +211,7 @@ def test_single_pendulum(tmp_path: Path) -> None:
     assert (np.diff(found.tracks[0].stamp_ns) == 1_000_000).all()
 
 
+@pytest.mark.nightly
 @needs_real
 @pytest.mark.slow
 def test_cube_tosses_and_double_pendulum(tmp_path: Path) -> None:

@@ -68,6 +68,7 @@ def test_a_sure_hand_repeats_its_shot() -> None:
     assert known().judge(BEST, 0.2, seed=0).success < 1.0
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_an_agent_finds_the_best_action() -> None:
     given = known()

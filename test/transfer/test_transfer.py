@@ -78,6 +78,7 @@ def test_a_tool_begins_elsewhere_in_a_changed_condition() -> None:
     assert pushing.TARGET[2] > 0
 
 
+@pytest.mark.nightly
 def test_a_network_of_control_steps_learns_how_a_bar_turns() -> None:
     task = push_i()
     cell, simulator = task.cell, Simulator(task.cell, threads=1, options={"timestep": 0.001})
@@ -128,6 +129,7 @@ def test_a_law_that_has_its_numbers_from_the_scene_is_kept(centred: bool, tmp_pa
     np.testing.assert_array_equal(again.values, values[None])
 
 
+@pytest.mark.nightly
 def test_a_residual_network_learns_an_offset() -> None:
     rng = np.random.default_rng(0)
     command, time_s = rng.uniform(size=(10, 2)), np.linspace(0, 1, 20)

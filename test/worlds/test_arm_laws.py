@@ -162,6 +162,7 @@ def test_a_gear_has_three_stiffnesses_and_a_loop() -> None:
     assert lost == pytest.approx(4 * 0.2 * 0.04, rel=0.15)
 
 
+@pytest.mark.nightly
 def test_a_stiff_gear_is_no_gear() -> None:
     drive = Drive(None, np.array([[0.8, -0.6]]), 0.0, 0.5, 100.0, np.zeros(1))
     stiff = replace(gear(), stiffness=one(2e4), damping=one(2.0), loop=one(0.0), ends=np.array([[1e6, 2e6]]))

@@ -64,6 +64,7 @@ def test_energy_stays_without_friction() -> None:
         assert np.ptp(totals) < 1e-4 * swing  # what the rates by differences allow
 
 
+@pytest.mark.nightly
 def test_half_the_step_gives_the_same_motion() -> None:
     first = np.array([[1.2, -0.9], [0.4, 1.5]])
     coarse = Drive(None, first, 0.0, 1.5, 100.0, np.zeros(2))

@@ -42,7 +42,8 @@ def test_a_table_that_is_told_what_it_draws_gives_the_same_bits() -> None:
     assert [values(e) for e in told.episodes] == [values(e) for e in drawn.episodes]
 
 
-@pytest.mark.parametrize("asked", [Asked(6, "none"), pytest.param(STRIBECK, marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("asked", [Asked(6, "none"), STRIBECK])
 def test_an_arm_that_is_told_what_it_draws_gives_the_same_bits(asked: Asked) -> None:
     drawn = world("two_joint_arm_driven", asked)
     targets = np.stack([e.inputs[0].value for e in drawn.episodes])

@@ -52,6 +52,7 @@ def test_a_bar_slides_as_far_as_coulomb_says(friction: float) -> None:
     assert abs(after[2]) < 1e-9
 
 
+@pytest.mark.nightly
 def test_a_film_slows_in_proportion() -> None:
     physics = scene.physics(DEFAULT | {"feet@dyna@friction": 0.0}, {"film": laws.Drawn((), {}, "", viscous_1s=2.0)})
     assert slid((0.4, 0.0, 0.0), physics, 0.5)[3] == pytest.approx(0.4 * np.exp(-1.0), rel=1e-4)
@@ -111,6 +112,7 @@ def test_drives_are_late_slow_and_weak() -> None:
     assert weak.drive(told)(0.1)[0, 0] == pytest.approx(min(0.3, weak.quantities["most_ms"]))
 
 
+@pytest.mark.nightly
 def test_a_world_is_its_seed_alone() -> None:
     asked = Asked(4, None, ("camera_scale",))
     one, again = (scene.conceal(TASK, asked) for _ in range(2))
