@@ -7,6 +7,7 @@ EXTRAS = {
     "domain_coordinator": "ros",
     "matplotlib": "report",
     "numba": "bench",
+    "pyarrow": "parquet",
     "pysindy": "rivals",
     "rclpy": "ros",
     "ray": "ray",

@@ -63,14 +63,14 @@ class Recordings:
 
     file: Annotated[str, Field(max_length=200)]
     """In the data folder; a pattern, as `throw_*.csv`, stands for all files that match."""
-    format: Literal["csv", "xlsx", "npz", "mat"]
+    format: Literal["csv", "xlsx", "npz", "mat", "parquet"]
     name: str
     """Name of the episode, with {key}, {group}, {index}; `names.safe_name` makes it a folder's."""
     tables: str = "*"
     """npz: pattern of the arrays' names; xlsx: of the sheets' names; mat, npz: variables side by side, `time=T
     state=Y`. With a star in them, `time=*.t state=*.q`, what it stands for parts the recordings and is their {key}."""
     group_by: str = ""
-    """csv, xlsx: a column whose values part the rows into recordings."""
+    """csv, xlsx, parquet: a column whose values part the rows into recordings."""
     header: Annotated[int, Field(ge=0)] | None = None
     """csv, xlsx: line of the columns' names, 0 where there is none; left out: it is looked for."""
 

@@ -1,4 +1,4 @@
-"""Tables of numbers in files (CSV, NPZ, MAT, XLSX), each as named columns."""
+"""Tables of numbers in files (CSV, NPZ, MAT, XLSX, Parquet), each as named columns."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ import scipy.io
 from openpyxl.utils.exceptions import InvalidFileException  # type: ignore[import-untyped]
 
 from compass_ros.episodes.delimited import read_rows
+from compass_ros.episodes.parquet import parquet_tables
 from compass_ros.episodes.raw import one_line
 from compass_ros.episodes.table import Table
 from compass_ros.episodes.table_rows import Row, tables_of
@@ -103,6 +104,7 @@ FORMATS: Mapping[str, Callable[[Path, Selection], Iterator[Table]]] = {
     "xlsx": xlsx_tables,
     "npz": npz_tables,
     "mat": mat_tables,
+    "parquet": lambda path, selection: iter(parquet_tables(path, selection.group_by)),
 }
 """Each raises DataError without the file's name."""
 

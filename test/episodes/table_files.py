@@ -22,7 +22,7 @@ POSE = np.random.default_rng(4).normal(size=(FRAMES, 7)).round(6)
 def imported(folder: Path, file: str, columns: Sequence[object], time: object = "t", **more: object) -> Imported:
     """The bags of one file in the folder; `more` goes to the recordings."""
     quantity = {1: "joint", 3: "xyz", 7: "pose"}[len(columns)]
-    kinds = {"xlsx": "xlsx", "npz": "npz", "mat": "mat"}
+    kinds = {"xlsx": "xlsx", "npz": "npz", "mat": "mat", "parquet": "parquet"}
     recordings = {"file": file, "format": kinds.get(file.rsplit(".", 1)[-1], "csv"), "name": "{file}_{index}", **more}
     content = {
         "cell": "lab",
