@@ -128,6 +128,7 @@ def run(
     from compass_ros.pipeline import calibrate as pipeline
     from compass_ros.progress import Steady
     from compass_ros.reporting import print_result
+    from compass_ros.reporting.words import left_out_lines
     from compass_ros.results import make_writable, write_all
 
     started = time.monotonic()
@@ -160,7 +161,7 @@ def run(
         raise typer.Exit(130) from None
     if style is ProgressStyle.bar:
         print_result(result)
-        for warning in (*result.left_out, *result.warnings):
+        for warning in (*left_out_lines(result.left_out), *result.warnings):
             typer.echo(f"note: {warning}", err=True)
         print(f"report: {os.path.relpath(out / 'report.html')}")
 

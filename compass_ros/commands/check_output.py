@@ -15,6 +15,7 @@ from compass_ros.checks.figures import Figures
 from compass_ros.checks.finding import Finding, Severity
 from compass_ros.reporting.numbers import MISSING, percent, plain
 from compass_ros.reporting.table import NARROW
+from compass_ros.reporting.words import left_out_lines
 from compass_ros.types import LeftOut
 
 STYLE: Mapping[Severity, str] = {"bad": "bold red", "repaired": "bold green", "note": "bold yellow"}
@@ -29,7 +30,7 @@ def print_checked(
     out.print(_table(rows))
     for one in sorted(checked.findings, key=lambda one: list(STYLE).index(one.severity)):
         out.print(Text.assemble((f"{WORD[one.severity]}: ", STYLE[one.severity]), f"{one.sentence}."))
-    for said in (*map(str, left_out), *checked.remarks):
+    for said in (*left_out_lines(left_out), *checked.remarks):
         out.print(Text.assemble(("Note: ", STYLE["note"]), f"{said}."))
     if checked.bad:
         out.print(Text("Usable? No: nothing may be concluded on physics before that is mended.", STYLE["bad"]))

@@ -30,6 +30,7 @@ def evaluate(
     from compass_ros.evaluation import evaluate as judge
     from compass_ros.operation.current import read_usable
     from compass_ros.reporting.result_json import read_result
+    from compass_ros.reporting.words import left_out_lines
 
     folder = result.parent if result.name == "result.json" else result
     content = read_result(folder / "result.json")
@@ -42,8 +43,8 @@ def evaluate(
     fitted = content["episodes"]["fit"]  # recordings, or windows of them
     if seen := [r for r in said.recordings if any(name == r or name.startswith(f"{r} at ") for name in fitted)]:
         typer.echo(f"note: {', '.join(seen)}: fitted, so this is no test of the result", err=True)
-    for one in left_out:
-        typer.echo(f"note: {one}", err=True)
+    for line in left_out_lines(left_out):
+        typer.echo(f"note: {line}", err=True)
 
 
 def cell_of(folder: Path, content: dict[str, Any]) -> str:

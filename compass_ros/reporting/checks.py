@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from compass_ros.reporting.numbers import probability, with_unit
 from compass_ros.reporting.words import (
@@ -17,6 +16,7 @@ from compass_ros.reporting.words import (
     by_kind,
     fit_rmse,
     held_out_rmse,
+    left_out_together,
     told,
 )
 from compass_ros.types import ParameterRow, Result
@@ -85,15 +85,8 @@ def _stopped(result: Result) -> Iterator[Check]:
 
 
 def _left_out(result: Result) -> Iterator[Check]:
-    """Recordings that could not be used, those with one reason together."""
-    bags: dict[str, dict[Path, list[str]]] = {}
-    for one in result.left_out:
-        path = Path(one.bag)
-        bags.setdefault(one.reason, {}).setdefault(path.parent, []).append(path.name)
-    for reason, by_folder in bags.items():
-        for folder, names in by_folder.items():
-            title = "Left out" if len(names) == 1 else f"{len(names)} left out"
-            yield Check("note", title, f"{folder / names[0]}{''.join(f', {name}' for name in names[1:])}: {reason}")
+    for count, bags, reason in left_out_together(result.left_out):
+        yield Check("note", "Left out" if count == 1 else f"{count} left out", f"{bags}: {reason}")
 
 
 def _floor(result: Result) -> Iterator[Check]:

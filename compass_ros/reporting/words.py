@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Literal
 
 from compass_ros.reporting.numbers import MINUS
-from compass_ros.types import DependsOn, ParameterRow, Phase, Result, SiteWord, Told, Unit, Verdict, Where
+from compass_ros.types import DependsOn, LeftOut, ParameterRow, Phase, Result, SiteWord, Told, Unit, Verdict, Where
 
 Level = Literal["good", "note", "care", "bad"]
 Model = Literal["nominal", "calibrated", "with_effects"]
@@ -168,3 +169,23 @@ def told_lines(told: Told) -> list[str]:
         f"not at all ({len(told.not_at_all)})": by_kind(told.not_at_all),
     }
     return [f"{how}: {names}" for how, names in said.items() if names]
+
+
+def left_out_together(left_out: Sequence[LeftOut]) -> list[tuple[int, str, str]]:
+    """How many recordings of one folder were left out for one reason, which (`folder/a, b`), and the reason."""
+    names: dict[tuple[str, Path], list[str]] = {}
+    for one in left_out:
+        path = Path(one.bag)
+        names.setdefault((one.reason, path.parent), []).append(path.name)
+    return [
+        (len(found), ", ".join([str(folder / found[0]), *found[1:]]), reason)
+        for (reason, folder), found in names.items()
+    ]
+
+
+def left_out_lines(left_out: Sequence[LeftOut]) -> list[str]:
+    """The same as sentences without a full stop."""
+    return [
+        f"{bags} {'was' if count == 1 else 'were'} left out: {reason}"
+        for count, bags, reason in left_out_together(left_out)
+    ]

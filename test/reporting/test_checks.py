@@ -119,6 +119,6 @@ def test_recordings_left_out_for_one_reason_stand_together(clean: Result) -> Non
     notes = [(c.title, c.detail) for c in assess(replace(clean, left_out=left)) if "left out" in c.title.lower()]
     assert notes == [
         ("2 left out", "w/a, b: start: nothing moves"),
-        ("Left out", "x/d: start: nothing moves"),
         ("Left out", "w/c: no clock"),
+        ("Left out", "x/d: start: nothing moves"),
     ]
