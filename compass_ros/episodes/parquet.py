@@ -64,14 +64,9 @@ def _cells(name: str, column: Any) -> dict[str, Cells]:
     kind, of = column.type, pa.types
     if of.is_timestamp(kind):
         return {name: _numbers(column.cast(pa.timestamp("ns", kind.tz)).cast(pa.int64()))}
-    if (
-        pa.types.is_integer(kind)
-        or pa.types.is_floating(kind)
-        or pa.types.is_decimal(kind)
-        or pa.types.is_boolean(kind)
-    ):
+    if any(is_one(kind) for is_one in (of.is_integer, of.is_floating, of.is_decimal, of.is_boolean)):
         return {name: _numbers(column)}
-    if pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind):
+    if any(is_one(kind) for is_one in (of.is_list, of.is_large_list, of.is_fixed_size_list)):
         rows = column.to_pylist()
         width = max((len(row) for row in rows if row), default=0)
         if all(row is None or len(row) == width for row in rows):
