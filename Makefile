@@ -89,7 +89,7 @@ $(READERS)/node_modules/.package-lock.json: $(READERS)/package-lock.json
 
 $(RERUN)/.installed: $(READERS)/requirements.txt
 	$(PYTHON) -m venv $(RERUN)
-	$(RERUN)/bin/python -m pip install --quiet --disable-pip-version-check --no-compile -r $<
+	$(RERUN)/bin/python -m pip install --quiet --disable-pip-version-check -r $<
 	@touch $@
 
 # The documentation as a site in out/site; once its environment is there, no network is needed.

@@ -80,14 +80,20 @@ def _shaking(names: Sequence[str], episodes: Sequence[Episode]) -> str:
         of_one, of_other = np.concatenate([np.zeros((2, 0)), *scatter], axis=1)
         if not of_one.any() or not of_other.any():
             continue
-        from scipy.stats import pearsonr  # takes a second to import
-
-        common = pearsonr(of_one, of_other, alternative="greater")
-        if common.statistic > _COMMON and common.pvalue < _CHANCE:
-            size = 1e3 * float(np.sqrt(common.statistic) * np.sqrt(of_one.std() * of_other.std()))
-            how = f"correlation {common.statistic:.2f}, {size:.2g} mm"
+        common, chance = _correlation(of_one, of_other)
+        if common > _COMMON and chance < _CHANCE:
+            size = 1e3 * float(np.sqrt(common) * np.sqrt(of_one.std() * of_other.std()))
+            how = f"correlation {common:.2f}, {size:.2g} mm"
             return f"{one} and {other} jitter together while they rest ({how}): their camera or its mount moves"
     return ""
+
+
+def _correlation(one: Floats, other: Floats) -> tuple[float, float]:
+    """Of two rows of numbers, and the probability of so much by chance."""
+    from scipy.stats import pearsonr  # takes a second to import
+
+    found = pearsonr(one, other, alternative="greater")
+    return float(found.statistic), float(found.pvalue)
 
 
 def _at_rest(episode: Episode, one: str, other: str) -> Floats:

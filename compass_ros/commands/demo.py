@@ -48,8 +48,7 @@ def demo(
     from rich.console import Console
 
     from compass_ros.cells import load
-    from compass_ros.commands.unseal import show
-    from compass_ros.concealed.comparison import compare
+    from compass_ros.commands.unseal_table import show
     from compass_ros.demo.processes import NodeGroup
     from compass_ros.demo.session import Plan, calibrate, conceal, play, prepare, reveal
     from compass_ros.reporting import read_result
@@ -82,7 +81,7 @@ def demo(
     answer = reveal(plan)
     typer.echo("\nNow the answer is opened. Its hash is the one that was sealed before the first shot.")
     console.print(parameter_table(result, worth_showing(content, answer["parameters"], plan.cell)))
-    show(content, answer, compare(content, answer))
+    show(content, answer)
     typer.echo(
         f"Sealed in {sealed - started:.0f} s, recorded in {recorded - sealed:.0f} s, "
         f"calibrated in {time.monotonic() - recorded:.0f} s."

@@ -8,12 +8,12 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from compass_ros.commands.unseal_table import MARKS
 from compass_ros.concealed.comparison import ordinary
 from compass_ros.proof.marks import FAINT, judge
 from compass_ros.reporting.table import NARROW
 
 Json = Mapping[str, Any]
-MARKS = {True: "right", False: "wrong", None: ""}
 
 
 def truth(answer: Json) -> str:
@@ -31,6 +31,8 @@ def show(result: Json, answer: Json) -> None:
     probability = f" (probability {explanations[0]['probability']:.2f})" if found else ""
     said = f"{marks.verdict}: {' and '.join(map(_named, found))}{probability}" if found else marks.verdict
     table.add_row("verdict", said, truth(answer), MARKS[marks.right])
+    if marks.verdict == "ambiguous":
+        table.add_row("left open", ", ".join(marks.found), "")
     for law in laws:
         faint = f", or none: less than {FAINT:g} times the noise" if law["strength"] < FAINT else ""
         table.add_row(f"{law['name']}: may be called", "", " or ".join(law["class"]) + faint)

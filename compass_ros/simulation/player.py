@@ -63,12 +63,16 @@ class Player:
     ) -> tuple[Floats, Floats]:
         """(B, T, s) states and (B, T, nsensordata) sensors after each of T steps from (B, s) states on."""
         mujoco.set_mjcb_time(None)  # MuJoCo's profiler, on since an MjData was made, costs a quarter of a rollout
-        rows, of = _distinct(values)
+        alike = _first_alike(values)
+        rows = sorted(set(alike))
         with self.warned.counting():
-            models = self.written(physics, rows)
-            with Programs(models, physics.terms(rows)):
+            models = dict(zip(rows, self.written(physics, values[rows]), strict=True))
+            with Programs(list(models.values()), physics.terms(values[rows])):
                 states, sensors = self._pool.rollout(
-                    [models[i] for i in of], self._data, start, controls, control_spec=physics.drives.parts, nstep=steps
+                    [models[row] for row in alike],
+                    *(self._data, start, controls),
+                    control_spec=physics.drives.parts,
+                    nstep=steps,
                 )
         self.spent.rollouts += len(values)
         self.spent.simulated_seconds += len(values) * steps * physics.time_step
@@ -83,9 +87,8 @@ def _copied(scene: mujoco.MjModel) -> mujoco.MjModel:
     return model
 
 
-def _distinct(values: Floats) -> tuple[Floats, list[int]]:
-    """(U, P) rows that are not alike to the bit, and of B rows which of them each is: those share a model, for writing
-    one takes as long as some hundred steps."""
-    seen: dict[bytes, int] = {}
-    of = [seen.setdefault(row.tobytes(), len(seen)) for row in values]
-    return values[[of.index(i) for i in range(len(seen))]], of
+def _first_alike(values: Floats) -> list[int]:
+    """Of (B, P) rows each, the first one that is alike to the bit: they share a model, for writing one takes as long as
+    some hundred steps."""
+    first: dict[bytes, int] = {}
+    return [first.setdefault(row.tobytes(), i) for i, row in enumerate(values)]

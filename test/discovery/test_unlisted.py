@@ -28,6 +28,7 @@ from compass_ros.simulation.effects.parameter import deviates
 from compass_ros.simulation.export import write_scene
 from compass_ros.simulation.sizes import unit_joint
 from compass_ros.types import Floats
+from test.by_night import but
 from test.cells.written import content, parameter, written
 from test.discovery.servo import noisy
 from test.simulation import robots
@@ -51,8 +52,6 @@ PLANTED = {
 }
 """How far off: a rotor, a mass, its place, a gain, the length of a link."""
 NAMED = [name for name in PLANTED if name not in ("elbow@dyna@stiffness", "shoulder@dyna@armature")]
-NIGHTLY = ("elbow@dyna@armature", "m2@actuation@servo_gain", "lower@dyna@centre_x", "lower@pose@z")
-"""Of these, those that are not named in every run of all tests."""
 
 
 def arm(folder: Path) -> Cell:
@@ -170,9 +169,7 @@ def test_the_sentence_has_the_number_as_it_is_and_as_it_should_be(tmp_path: Path
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.nightly if name in NIGHTLY else ()) for name in NAMED]
-)
+@pytest.mark.parametrize("name", but(NAMED, "lower@dyna@mass"))
 def test_a_wrong_number_is_named(tmp_path: Path, name: str) -> None:
     cell = arm(tmp_path)
     attached = law(Simulator(cell, threads=1), name)

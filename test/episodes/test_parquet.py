@@ -80,7 +80,7 @@ def test_what_is_no_parquet_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "data.parquet").write_bytes(b"PAR1 and no more")
     with pytest.raises(DataError, match="cannot be read as Parquet"):
         imported(tmp_path, "data.parquet", ["q"])
-    with pytest.raises(DataError, match="group_by: no column 'run'; it has t, q"):
+    with pytest.raises(DataError, match="group_by: no column 'run'; there are t, q"):
         imported(tmp_path, written(tmp_path, t=MS / 1000, q=ANGLE), ["q"], group_by="run")
     with pytest.raises(DataError, match="is empty"):
         imported(tmp_path, written(tmp_path, t=np.zeros(0), q=np.zeros(0)), ["q"])
