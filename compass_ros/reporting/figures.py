@@ -16,7 +16,7 @@ from matplotlib.patches import Circle, Patch, Rectangle
 
 from compass_ros.reporting.drawing import plane
 from compass_ros.reporting.extras import Scene, Shape
-from compass_ros.reporting.numbers import with_unit
+from compass_ros.reporting.numbers import unit_text, with_unit
 from compass_ros.reporting.palette import LIGHT
 from compass_ros.reporting.words import MODEL_LABEL, MODELS, Model, held_out_rmse, told
 from compass_ros.types import Floats, Graph, Replay, ReplayedTrack, Result
@@ -135,7 +135,8 @@ def parameter_curves(result: Result, most: int = 12, truth: Mapping[str, float] 
         figure = Figure(figsize=(2.5 * columns, 1.6 * max(math.ceil(len(shown) / columns), 1)), layout="constrained")
         for place, (i, row) in enumerate(shown):
             axes = figure.add_subplot(math.ceil(len(shown) / columns), columns, place + 1)
-            axes.set_title(f"{row.name} [{row.unit}]" if row.unit not in ("", "1") else row.name, fontsize=7)
+            unit = unit_text(row.unit)
+            axes.set_title(f"{row.name} [{unit}]" if unit else row.name, fontsize=7)
             if math.isfinite(row.std):
                 axes.axhspan(row.value - row.std, row.value + row.std, color=LIGHT["calibrated"], alpha=0.15, lw=0)
             axes.axhline(row.default, color=LIGHT["nominal"], ls="--", lw=1)

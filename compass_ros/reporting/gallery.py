@@ -13,6 +13,7 @@ from matplotlib.patches import Circle
 from compass_ros.reporting.drawing import episode_rmse, plane
 from compass_ros.reporting.extras import ReportExtras, ResidualMap
 from compass_ros.reporting.figures import LINE, causal_graph, gap_bars, parameter_curves, save, styled, trajectories
+from compass_ros.reporting.numbers import unit_text
 from compass_ros.reporting.palette import LIGHT
 from compass_ros.reporting.residuals import error_curves, judged, left_over
 from compass_ros.reporting.words import MODEL_LABEL, best_model, told
@@ -75,14 +76,17 @@ def left_over_map(residual: ResidualMap, region: Region | None = None, axes_show
     x, y = residual.x_m, residual.y_m
     extent = (float(x[0]) - half[0], float(x[-1]) + half[0], float(y[0]) - half[1], float(y[-1]) + half[1])
     with styled():
-        figure = Figure(figsize=(6.4, 3.6), layout="constrained")
+        figure = Figure(figsize=(6.4, 3.6), layout="compressed")  # of a plane that is as wide as it is high
         axes = figure.add_subplot()
         axes.grid(visible=False)
         image = axes.imshow(residual.value, origin="lower", extent=extent, cmap="viridis", interpolation="nearest")
         if region is not None:
             axes.add_patch(Circle(region.centre_m, region.radius_m, fill=False, edgecolor=LIGHT["bad"], linewidth=1.5))
+            (left, right, low, high), r = extent, 1.02 * region.radius_m
+            axes.set_xlim(min(left, region.centre_m[0] - r), max(right, region.centre_m[0] + r))
+            axes.set_ylim(min(low, region.centre_m[1] - r), max(high, region.centre_m[1] + r))
         axes.set_xlabel(f"{'xyz'[axes_shown[0]]} [m]")
         axes.set_ylabel(f"{'xyz'[axes_shown[1]]} [m]")
         axes.set_title(residual.label)
-        figure.colorbar(image, label=residual.unit, shrink=0.8)
+        figure.colorbar(image, label=unit_text(residual.unit), shrink=0.8)
     return figure
