@@ -83,6 +83,7 @@ def assemble(
         unit=simulator.unit,
         together=estimate.together,
         time_step_s=cell.time_step,
+        friction_holds=cell.holds,
     )
 
 

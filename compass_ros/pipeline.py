@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -43,15 +43,23 @@ def calibrate(
     """Which parameters, which values, what is left. Raises DataError where the recordings cannot answer.
 
     The same episodes, cell and configuration give the same result, bit for bit. Wall time is for the caller to add.
-    Where the simulator's time step is what is missing, all is done anew with a shorter one.
+    Where the simulator's time step or its soft dry friction is what is missing, all is done anew with another.
     """
-    done = _calibrate(episodes, cell, config, report, keep)
-    if (shorter := done[1].shorter_s) is None:
-        return done
-    result, found = _calibrate(episodes, replace(cell, time_step=shorter), config, report, keep)
-    said = f"simulated with time steps of {1e3 * shorter:g} ms, which the scene should have"
-    why = "with its own, contacts are others than in the recordings"
-    return replace(result, warnings=(f"{said}: {why}", *result.warnings)), found
+    result, found = _calibrate(episodes, cell, config, report, keep)
+    while found.instead is not None:
+        cell = found.instead
+        result, found = _calibrate(episodes, cell, config, report, keep)
+    return replace(result, warnings=(*other_numerics(cell), *result.warnings)), found
+
+
+def other_numerics(cell: Cell) -> Iterator[str]:
+    """In which numerics a simulation is not the scene's, and why."""
+    if cell.holds:
+        said = "simulated with dry friction that holds a joint at rest, which the scene should have (solreffriction, "
+        yield f"{said}solimpfriction): with its own, joints creep that stand still in the recordings"
+    if cell.time_step is not None:
+        said = f"simulated with time steps of {1e3 * cell.time_step:g} ms, which the scene should have"
+        yield f"{said}: with its own, contacts are others than in the recordings"
 
 
 def _calibrate(

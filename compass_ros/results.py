@@ -30,7 +30,7 @@ def write_all(
     """Write into `out`, each file whole or not at all; result.json last: where it is, all is there."""
     make_writable(out)
     values = np.array([row.value for row in result.parameters])
-    cell = replace(cell, time_step=result.time_step_s)
+    cell = replace(cell, time_step=result.time_step_s, holds=result.friction_holds)
     write_scene(found.simulator.cell if found.simulator else cell, values, out / SCENE)
     write_effects_of(found.simulator, found.values, found.effect_std, cell, values, out / EFFECTS)
     extras = ReportExtras(

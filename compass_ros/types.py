@@ -535,3 +535,5 @@ class Result:
     """Parameters that are told only together."""
     time_step_s: float | None = None
     """Of the simulation, where it is not the scene's."""
+    friction_holds: bool = False
+    """Whether dry friction holds a joint that is at rest, where the scene's lets it creep."""

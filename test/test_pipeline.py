@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from compass_ros import estimation, pipeline
 from compass_ros.assembly import assemble
 from compass_ros.calibration.noise import Noise, measure_noise
-from compass_ros.cells import load
+from compass_ros.cells import Cell, load
 from compass_ros.config import CalibrationConfig
 from compass_ros.discovery import Discovery, fit_failed, not_evaluated
 from compass_ros.errors import DataError
@@ -179,26 +180,40 @@ def test_a_search_that_cannot_be_done_leaves_the_calibration(
     assert says in ended.mismatch.sentence
 
 
-def test_with_a_shorter_step_all_is_done_anew(
-    episodes: list[Episode], result: Result, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("other", "said", "kept"),
+    [
+        ({"time_step": 0.00025}, "simulated with time steps of 0.25 ms", {"time_step_s": 0.00025}),
+        ({"holds": True}, "simulated with dry friction that holds", {"friction_holds": True}),
+    ],
+)
+def test_with_other_numerics_all_is_done_anew(
+    episodes: list[Episode],
+    result: Result,
+    monkeypatch: pytest.MonkeyPatch,
+    other: dict[str, Any],
+    said: str,
+    kept: dict[str, Any],
 ) -> None:
-    """Its fit is that of the shorter step, its gaps too, and what is written says so."""
-    steps: list[float] = []
+    """Its fit is that of the other simulator, its gaps too, and what is written says so."""
+    cells: list[Cell] = []
 
     def discover(simulator: Simulator, *_: object) -> Discovery:
-        steps.append(simulator.time_step)
-        return fit_failed("the step is too long", 0.25 * steps[0]) if len(steps) == 1 else not_evaluated("it was asked")
+        cells.append(simulator.cell)
+        if len(cells) > 1:
+            return not_evaluated("it was asked")
+        return fit_failed("another is better", replace(simulator.cell, **other))
 
     monkeypatch.setattr(pipeline, "refine", lambda *_: None)
     monkeypatch.setattr(pipeline, "discover", discover)
     ended, found_last = calibrate(episodes, cell(), replace(CONFIG, discover=True))
-    assert steps == [steps[0], 0.25 * steps[0]]
-    assert ended.time_step_s == 0.25 * steps[0]
+    assert cells == [cell(), replace(cell(), **other)]
     assert found_last.mismatch.verdict == ended.mismatch.verdict == "not_evaluated"
-    assert ended.warnings[0].startswith(f"simulated with time steps of {250 * steps[0]:g} ms")
-    assert ended.gap["nominal"] != result.gap["nominal"]
-    assert from_json(to_json(ended)).time_step_s == ended.time_step_s
-    assert result.time_step_s is None
+    assert ended.warnings[0].startswith(said)
+    assert (ended.gap["nominal"] == result.gap["nominal"]) is ("holds" in other)  # no joint has friction there
+    assert kept.items() <= to_json(ended).items()
+    assert not kept.keys() & to_json(result).keys()
+    assert to_json(from_json(to_json(ended))) == to_json(ended)
 
 
 @pytest.mark.parametrize("error", [RuntimeError("a bug"), KeyboardInterrupt(), MemoryError()])

@@ -27,6 +27,8 @@ class Cell:
     """Joints whose motors are bodies of their own in the compiled scene (`cells/rotors.py`)."""
     time_step: float | None = None
     """Of the simulation where it is not the scene's [s]."""
+    holds: bool = False
+    """Whether dry friction holds a joint that is at rest, where the scene's lets it creep."""
 
     @property
     def name(self) -> str:

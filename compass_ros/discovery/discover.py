@@ -16,7 +16,7 @@ from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.floor import left_open
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.neighbours import rank
-from compass_ros.discovery.numerics import numerics_as_model, shorter_step
+from compass_ros.discovery.numerics import friction_that_holds, numerics_as_model, shorter_step
 from compass_ros.discovery.objections import frame_rate, objections
 from compass_ros.discovery.odds import Prior
 from compass_ros.discovery.search import Tell, search
@@ -76,6 +76,8 @@ def weigh(
     """
     likelihood = refined.likelihood
     plain = Hypothesis((), simulator, likelihood, refined.fit)
+    if other := friction_that_holds(plain, log((1 - alpha) / alpha)):
+        return fit_failed("dry friction holds joints that are at rest where the scene's lets them creep", other)
     asked = candidates(simulator, plain.response.values, likelihood.inputs, likelihood.time_s)
     first = rank(FirstOrder(plain.response), asked)
     prior = Prior.of(asked)
@@ -88,8 +90,8 @@ def weigh(
     if best > threshold:
         if cause := numerics_as_model(plain, best):
             return fit_failed(f"{cause}, which is the simulator's numerics and not physics")
-        if simulator.cell.time_step is None and (step := shorter_step(plain, best, threshold)):
-            return fit_failed(f"what is left goes away with time steps of {1e3 * step:g} ms", step)
+        if simulator.cell.time_step is None and (finer := shorter_step(plain, best, threshold)):
+            return fit_failed("what is left goes away with a shorter time step", finer)
     tell("weigh effects", 0.95)
     said = Judge(found, held_out, noise, alpha, threshold, odds, undetectable(first), warnings).discovery()
     if said.mismatch.verdict != "none":

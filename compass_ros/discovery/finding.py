@@ -66,8 +66,8 @@ class Discovery:
     """Explanations of known laws, and that nothing is missing, down to a hundredth of the probability."""
     open_sigma: float = 0.0
     """What the parameters' error bars leave open in held-out episodes, over the noise."""
-    shorter_s: float | None = None
-    """A time step [s] with which the simulator explains more as it is than with any law or discrepancy."""
+    instead: Cell | None = None
+    """The cell with other numerics, with which a calibration has to be done anew before anything is said."""
     rivals: tuple[Hypothesis, ...] = ()
     """The models between which an ambiguous verdict leaves the choice."""
     files: Mapping[str, str] = field(default_factory=dict)
@@ -79,10 +79,10 @@ def not_evaluated(reason: str) -> Discovery:
     return Discovery(Mismatch("not_evaluated", None, (), (), "", f"Missing physics was not looked for: {reason}."))
 
 
-def fit_failed(reason: str, shorter_s: float | None = None) -> Discovery:
+def fit_failed(reason: str, instead: Cell | None = None) -> Discovery:
     """No verdict, for a fit of the search went wrong."""
     mismatch = Mismatch("fit_failed", None, (), (), "", f"No verdict on missing physics: {reason}.")
-    return Discovery(mismatch, shorter_s=shorter_s)
+    return Discovery(mismatch, instead=instead)
 
 
 def data_bad(sentence: str) -> Discovery:

@@ -49,13 +49,18 @@ def nuisances(simulator: Simulator, likelihood: Likelihood, fit: Fit) -> Floats:
     """
     moved = partial(moved_by, simulator, likelihood, fit.point, fit.linear.residual)
     columns = [finite_step(simulator, likelihood, fit.point, fit.linear.residual)]
-    joints = [site.name for site in simulator.moving.values() if site.kind in JOINTS]
-    for joint in creeping(simulator.written(fit.point.values), joints):
+    for joint in creeping_joints(simulator, fit.point.values):
         columns += [moved(softness={joint: share}) for share in SOFTER]
     if simulator.places.touching:
         columns.append(moved(softness={CONTACTS: SOFTER[0]}))
         columns.append(moved({"impratio": IMPRATIO * simulator.options.impratio}))
     return np.concatenate([np.stack(columns, axis=-1), stated_errors(simulator.cell, likelihood)], axis=-1)
+
+
+def creeping_joints(simulator: Simulator, values: Floats) -> tuple[str, ...]:
+    """Those whose dry friction at (P,) values is the engine's soft constraint."""
+    joints = [site.name for site in simulator.moving.values() if site.kind in JOINTS]
+    return () if simulator.cell.holds else creeping(simulator.written(values), joints)
 
 
 def stated_errors(cell: Cell, likelihood: Likelihood) -> Floats:

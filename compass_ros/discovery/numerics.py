@@ -1,4 +1,4 @@
-"""Does what is left go away with another time step, friction cone or solver? How sure are laws beside a time step?"""
+"""Does what is left go away with another time step, friction, cone or solver? How sure are laws beside a time step?"""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ import numpy as np
 
 from compass_ros.calibration.cost import robust_weight
 from compass_ros.calibration.least_squares import minimise, normal_equations
+from compass_ros.calibration.residuals import residual_at
+from compass_ros.cells import Cell
 from compass_ros.discovery.evidence import solve
 from compass_ros.discovery.hypothesis import Hypothesis
-from compass_ros.discovery.nuisances import finite_step, moved_by
+from compass_ros.discovery.nuisances import creeping_joints, finite_step, moved_by
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.numerics import other_numerics
 from compass_ros.types import Floats
@@ -18,7 +20,7 @@ from compass_ros.types import Floats
 SHORTER = 0.25
 """Of the time step: a budget, for a calibration takes four times as long with a quarter of it."""
 STEPS = 10
-"""Gauss-Newton steps with a shorter time step, from the fit with the scene's: a budget."""
+"""Gauss-Newton steps with other numerics, from the fit with the scene's: a budget."""
 
 
 def with_numerics(model: Hypothesis) -> Floats:
@@ -40,8 +42,9 @@ def with_numerics(model: Hypothesis) -> Floats:
     return std
 
 
-def shorter_step(plain: Hypothesis, best: float, threshold: float) -> float | None:
-    """A time step [s] with which the plain model has higher log odds than the `best` model against it as it is.
+def shorter_step(plain: Hypothesis, best: float, threshold: float) -> Cell | None:
+    """The cell with a shorter time step, with which the plain model has higher log odds than the `best` model against
+    it as it is.
 
     What a step does to first order is a nuisance of every model. A glancing contact is another one with another step:
     of such, halving the step does not foretell what a quarter of it does (`finite_step`: three quarters of all). Where
@@ -49,21 +52,47 @@ def shorter_step(plain: Hypothesis, best: float, threshold: float) -> float | No
     optimum a change m of the residual r lowers half its square by -r m at most to first order, whatever parameters then
     do, and so by |r| |m| (Cauchy and Schwarz), each weighted as in the robust loss.
     """
+    finer = replace(plain.simulator.cell, time_step=SHORTER * plain.simulator.time_step)
+    whole = finite_step(plain.simulator, plain.likelihood, plain.fit.point, plain.fit.linear.residual)
+    other = _simulated(plain, finer, (1 - SHORTER) * whole, threshold, best)
+    return finer if other and _gained(plain, other) > best else None
+
+
+def friction_that_holds(plain: Hypothesis, threshold: float) -> Cell | None:
+    """The cell with dry friction that holds a joint at rest, where the plain model is more probable with it by more
+    than a `threshold` of log odds.
+
+    Nature's friction holds, and the engine's is a soft constraint, under which a joint creeps. To first order that is a
+    nuisance of every model; a joint that sticks and then jumps is another motion. Both have the same parameters.
+    """
+    if not creeping_joints(plain.simulator, plain.fit.point.values):
+        return None
+    held = replace(plain.simulator.cell, holds=True)
+    other = _simulated(plain, held, np.zeros(1), threshold, threshold)
+    if other is None or _gained(plain, other) <= threshold:
+        return None
+    return held if other.free.alone - plain.free.alone > threshold else None
+
+
+def _simulated(plain: Hypothesis, cell: Cell, foretold: Floats, surprise: float, best: float) -> Hypothesis | None:
+    """The plain model fitted anew with a cell of other numerics; None where these cannot gain more than `best` of log
+    likelihood, or do what is `foretold` (E, F, C) but for less than the `surprise` [log odds]."""
     simulator, likelihood, fit = plain.simulator, plain.likelihood, plain.fit
-    residual, step = fit.linear.residual, SHORTER * simulator.time_step
-    moved = moved_by(simulator, likelihood, fit.point, residual, {"timestep": step})
-    foretold = (1 - SHORTER) * finite_step(simulator, likelihood, fit.point, residual)
-    kappa = likelihood.correlation_time
-    if 0.5 * float(np.sum((moved - foretold) ** 2)) / kappa < threshold:
+    other = Simulator(cell, threads=simulator.threads).driven(simulator.physics.bank)
+    played = replace(likelihood, predict=other.observe, predict_alike=other.observe_alike)
+    residual, kappa = fit.linear.residual, likelihood.correlation_time
+    moved = residual_at(played, fit.point) - residual
+    if 0.5 * float(np.sum((moved - foretold) ** 2)) / kappa < surprise:
         return None
     weighted = np.sqrt(robust_weight(residual, fit.robust))
     if float(np.linalg.norm(weighted * residual) * np.linalg.norm(weighted * moved)) / kappa <= best:
         return None
-    finer = Simulator(replace(simulator.cell, time_step=step), threads=simulator.threads)
-    finer = finer.driven(simulator.physics.bank)
-    other = replace(likelihood, predict=finer.observe, predict_alike=finer.observe_alike)
-    cost = minimise(other, fit.point, fit.free, STEPS, fit.robust, 1.0).point.cost
-    return step if (fit.point.cost - cost) / kappa > best else None
+    return Hypothesis((), other, played, minimise(played, fit.point, fit.free, STEPS, fit.robust, 1.0))
+
+
+def _gained(plain: Hypothesis, other: Hypothesis) -> float:
+    """Log likelihood by other numerics."""
+    return (plain.fit.point.cost - other.fit.point.cost) / plain.likelihood.correlation_time
 
 
 def numerics_as_model(plain: Hypothesis, best: float) -> str:

@@ -83,7 +83,8 @@ def current(cell: Cell, version: Path | None = None, threads: int = 0) -> Curren
         return Current(simulator, simulator.defaults)
     where = str(version / "result.json")
     result = read_result(version / "result.json", cell.name)
-    rows, cell = result["parameters"], replace(cell, time_step=result.get("time_step_s"))
+    rows, holds = result["parameters"], result.get("friction_holds", False)
+    cell = replace(cell, time_step=result.get("time_step_s"), holds=holds)
     own = {p.name for p in cell.parameters}
     if any(row["name"] not in own for row in rows):
         cell = with_auto(cell)  # calibrated with `--parameters auto`

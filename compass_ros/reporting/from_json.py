@@ -55,6 +55,7 @@ def from_json(content: Json) -> Result:
         unit=gap.get("unit", "m"),
         cell_file=content.get("cell_file", ""),
         time_step_s=content.get("time_step_s"),
+        friction_holds=content.get("friction_holds", False),
         parameters=tuple(_parameter(row) for row in content["parameters"]),
         together=tuple(Together(tuple(g["parameters"]), g["ratios"]) for g in content.get("together", ())),
         graph=Graph(

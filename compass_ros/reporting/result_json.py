@@ -179,6 +179,7 @@ def to_json(result: Result) -> dict[str, Any]:
         "cancelled": bool(result.cancelled),
         "warnings": list(result.warnings),
         **({} if result.time_step_s is None else {"time_step_s": result.time_step_s}),
+        **({"friction_holds": True} if result.friction_holds else {}),
         "versions": dict(sorted(result.versions.items())),
         "budget": {
             "rollouts": int(result.budget.rollouts),

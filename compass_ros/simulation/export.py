@@ -18,6 +18,7 @@ from compass_ros.cells.scene_files import SceneFiles, scene_files
 from compass_ros.cells.scene_source import scene_source
 from compass_ros.simulation.effects import FittedEffect, write_effects
 from compass_ros.simulation.native.program import mujoco_library, save_numbers
+from compass_ros.simulation.numerics import hold
 from compass_ros.simulation.simulator import Simulator
 from compass_ros.types import Floats
 
@@ -39,6 +40,8 @@ def write_scene(cell: Cell, values: Floats, path: Path) -> None:
     spec.compiler.saveinertial = True  # else MuJoCo computes masses from the drawing again
     spec.comment = spec.comment.replace("--", "- -")  # MuJoCo reads that, XML has no such comment
     model = _calibrated(spec, cell, values)
+    if cell.holds:
+        hold(model, np.flatnonzero(model.dof_frictionloss))
     _as_stated(spec)
     with _digits(_EXACT):
         save_numbers(spec, model, path)

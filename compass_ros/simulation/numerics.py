@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -16,26 +16,36 @@ CONTACTS = "*"
 """All contacts, among the names of joints."""
 
 
-def set_numerics(model: mujoco.MjModel, options: Mapping[str, float], softness: Mapping[str, float]) -> None:
+def set_numerics(
+    model: mujoco.MjModel, options: Mapping[str, float], softness: Mapping[str, float], holds: bool = False
+) -> None:
     """Options into a model, and the regularisation of some joints' dry friction, or of CONTACTS, as a share of what it
-    is.
+    is; or dry friction that holds on all joints.
 
     At a share of zero friction holds: nearly rigid, and at rest within the shortest time that MuJoCo allows, two steps.
     Source: MuJoCo's documentation, Computation, R = (1 - d) / d times the inverse inertia.
     """
     for name, value in options.items():
         setattr(model.opt, name, value)
+    if holds:
+        hold(model, range(model.nv))
     for name, share in softness.items():
         if name == CONTACTS:
             for impedance in (model.geom_solimp[:, :2], model.pair_solimp[:, :2]):
                 impedance[:] = _harder(impedance, share)
             continue
+        if not share:
+            hold(model, _dofs(model, name))
+            continue
         for dof in _dofs(model, name):
-            if share:
-                model.dof_solimp[dof, 0] = _harder(model.dof_solimp[dof, 0], share)
-            else:
-                model.dof_solimp[dof, :2] = HELD
-                model.dof_solref[dof] = 2 * model.opt.timestep, 1.0
+            model.dof_solimp[dof, 0] = _harder(model.dof_solimp[dof, 0], share)
+
+
+def hold(model: mujoco.MjModel, dofs: Iterable[int]) -> None:
+    """Let the dry friction of some degrees of freedom hold what is at rest."""
+    for dof in dofs:
+        model.dof_solimp[dof, :2] = HELD
+        model.dof_solref[dof] = 2 * model.opt.timestep, 1.0
 
 
 def _dofs(model: mujoco.MjModel, joint: str) -> list[int]:

@@ -67,7 +67,8 @@ class Simulator:
         """`options`: MuJoCo's numerics (`timestep`, `cone`, `solver`, ...) where they are not to be the scene's.
         `softness`: what is left of the regularisation of joints' dry friction, or of contacts (`set_numerics`)."""
         of_cell = {} if cell.time_step is None else {"timestep": cell.time_step}
-        self._numerics = partial(set_numerics, options={**of_cell, **(options or {})}, softness=softness or {})
+        told = {**of_cell, **(options or {})}
+        self._numerics = partial(set_numerics, options=told, softness=softness or {}, holds=cell.holds)
         dynamics = dynamics_of(cell)
         self._numerics(dynamics.model)
         drives = Drives(cell, dynamics.model)

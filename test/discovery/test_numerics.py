@@ -13,12 +13,12 @@ from scipy.spatial.transform import Rotation
 
 from compass_ros.calibration.cost import start
 from compass_ros.calibration.differences import linearise
-from compass_ros.calibration.least_squares import Fit
+from compass_ros.calibration.least_squares import Fit, minimise
 from compass_ros.cells import load
 from compass_ros.discovery.evidence import Tangent, evidences
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.nuisances import finite_step, nuisances, stated_errors
-from compass_ros.discovery.numerics import numerics_as_model, shorter_step
+from compass_ros.discovery.numerics import friction_that_holds, numerics_as_model, shorter_step
 from compass_ros.discovery.response import Response
 from compass_ros.planning.planned import perfect
 from compass_ros.simulation import Simulator
@@ -104,7 +104,9 @@ def test_a_step_that_is_too_long_is_said() -> None:
     step = Simulator(cell()).time_step
     long, best = with_step(4 * step, Simulator(cell(), threads=1)), 100.0
     assert long.fit.point.cost > 10 * best
-    assert shorter_step(long, best, 5.0) == pytest.approx(step)
+    finer = shorter_step(long, best, 5.0)
+    assert finer
+    assert finer.time_step == pytest.approx(step)
     assert shorter_step(long, 10 * long.fit.point.cost, 5.0) is None
     dragged = Simulator(cell(), [Attached(EFFECTS["viscous_drag"], PUCKS)], threads=1)
     drag = with_step(step, dragged)
@@ -127,6 +129,21 @@ def test_friction_that_holds_where_the_engine_creeps_calls_for_nothing(tmp_path:
     assert plain.free.log < plain.free.alone
     assert evidences(tangent, [None])[0].log > evidences(blind, [None])[0].log + 5
     np.testing.assert_allclose(tangent.parameters[..., -1], -tangent.residual, atol=1e-9)
+
+
+@pytest.mark.parametrize("holds", [False, True])
+def test_friction_that_holds_is_taken_where_it_held(tmp_path: Path, holds: bool) -> None:
+    """To first order a nuisance explains it, so nothing is missing; what is predicted is still a joint that creeps."""
+    own = servo(tmp_path, dry=0.3)
+    simulator, played = Simulator(own, threads=1), Simulator(replace(own, holds=holds), threads=1)
+    steps = np.random.default_rng(1).uniform(-1.2, 1.2, (6, 2))
+    clean = perfect(simulator, steps, 60.0, NOISE)
+    seen = played.observe(np.tile([1.2, 1.1] * simulator.defaults, (len(steps), 1)), steps, clean.time_s)
+    likelihood = replace(clean, measured=seen + np.random.default_rng(2).normal(0, NOISE, seen.shape))
+    fit = minimise(likelihood, start(likelihood, simulator.defaults), np.arange(2), 20, 1e6)
+    plain = Hypothesis((), simulator, likelihood, fit)
+    assert (plain.chi_square > 10) is holds
+    assert friction_that_holds(plain, 4.6) == (replace(own, holds=True) if holds else None)
 
 
 def test_missing_drag_is_no_numerics() -> None:

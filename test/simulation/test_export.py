@@ -14,6 +14,7 @@ from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached, attach, read_effects
 from compass_ros.simulation.export import write_effects_of, write_scene
 from compass_ros.types import Floats
+from test.discovery.servo import servo
 from test.simulation.table import DESCRIBED, WIDE, cell, simulator
 
 
@@ -44,6 +45,17 @@ def test_a_time_step_that_is_not_the_scenes_is_simulated_and_written(tmp_path: P
     assert Simulator(shorter, threads=1).time_step == 0.00025
     assert Simulator(shorter, [Attached(EFFECTS["swirl"], ("puck1",))], threads=1).time_step == 0.00025
     assert Simulator(shorter, options={"timestep": 0.001}, threads=1).time_step == 0.001
+
+
+def test_friction_that_holds_is_simulated_and_written(tmp_path: Path) -> None:
+    own = replace(servo(tmp_path, dry=0.3), holds=True)
+    held = Simulator(own, threads=1)
+    write_scene(own, held.defaults, tmp_path / "scene.xml")
+    read = mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml"))
+    plain = Simulator(replace(own, holds=False), threads=1).written(held.defaults)
+    for name in ("dof_solref", "dof_solimp"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(held.written(held.defaults), name))
+        assert not np.array_equal(getattr(read, name), getattr(plain, name))
 
 
 @pytest.mark.parametrize("shot", [DESCRIBED, WIDE[1]])
