@@ -11,6 +11,7 @@ from compass_ros.calibration.cost import Point, cost, robust_loss
 from compass_ros.calibration.differences import Linear, difference_steps, extended
 from compass_ros.calibration.least_squares import minimise
 from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.calibration.refine import Strongest, growing
 from compass_ros.calibration.residuals import typical_residual
 from compass_ros.calibration.settle import settled
 from compass_ros.discovery.evidence import solve
@@ -113,7 +114,8 @@ def with_law(parent: Hypothesis, values: Floats) -> tuple[Ints, Floats]:
 def whole(parent: Hypothesis, begun: Begun) -> Hypothesis:
     """A model fitted to all episodes, with exact differences at the end.
 
-    One that began at its parent's fit goes on with the differences there as long as they hold.
+    One that began at its parent's fit goes on with the differences there as long as they hold. One that did not is
+    fitted on a horizon that grows anew: a few episodes say little of most parameters.
     """
     simulator, likelihood = widened(parent.simulator, parent.likelihood, begun.laws)
     free, steps = with_law(parent, begun.point.values)
@@ -124,11 +126,22 @@ def whole(parent: Hypothesis, begun: Begun) -> Hypothesis:
             (residual,) = cost(likelihood, [point], parent.fit.robust)[1]
             linear = extended(parent.fit.linear, likelihood, point, residual, free)
     robust = 3.0 * typical_residual(likelihood, point)
-    if robust > parent.fit.robust:  # what these episodes did not hold is far off
+    if not begun.bent:
+        point = _grown(likelihood, point.values, free, steps, begun.laws)
+    elif robust > parent.fit.robust:  # what these episodes did not hold is far off
         point = minimise(likelihood, point, free, FEW, robust, 3.0, linear, fresh=False, steps=steps).point
         linear = None
     fit = minimise(likelihood, point, free, FEW, parent.fit.robust, _LAST, linear, steps=steps)
     return Hypothesis((*parent.laws, *begun.laws), simulator, likelihood, fit, without=parent.bare)
+
+
+def _grown(likelihood: Likelihood, values: Floats, free: Ints, steps: Floats, laws: Sequence[Attached]) -> Point:
+    """All that is free, but for the shapes of the last laws, fitted on a growing horizon of all episodes."""
+    wide, amplitude = np.ones(len(values)), np.concatenate([a.amplitudes for a in laws])
+    wide[free] = steps
+    shapes = len(values) - len(amplitude) + np.flatnonzero(~amplitude)
+    *_, (_, fit) = growing(likelihood, values, shapes, Strongest(free, wide))
+    return fit.point
 
 
 def finished(hypothesis: Hypothesis) -> Hypothesis:

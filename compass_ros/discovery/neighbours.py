@@ -101,9 +101,11 @@ def beside(model: Hypothesis, ranked: Sequence[Ranked], prior: Prior) -> list[fl
 
 
 def probable(begun: Sequence[Begun], prior: Prior) -> list[Begun]:
-    """Those that could be probable, and the best two in any case; one of each set of laws on the same sites.
+    """Those that could be probable, and in any case the best two and the best of the best two laws; one of each set of
+    laws on the same sites.
 
-    By the likelihood and the prior odds: what shapes cost is of the size of the margin.
+    By the likelihood and the prior odds: what shapes cost is of the size of the margin. Where more than one law is
+    missing none of them comes near, and these differences say little about which is one of them.
     """
     best: dict[frozenset[tuple[str, tuple[str, ...]]], tuple[float, Begun]] = {}
     for one in begun:
@@ -113,7 +115,9 @@ def probable(begun: Sequence[Begun], prior: Prior) -> list[Begun]:
             best[sites] = odds, one
     ordered = sorted(best.values(), key=lambda pair: -pair[0])
     least = ordered[0][0] + 2 * log(SLIGHT) if ordered else 0.0
-    return [one for i, (odds, one) in enumerate(ordered) if i < 2 or odds > least]
+    first = {one.laws[0].effect.name: one for _, one in reversed(ordered)}
+    anyway = [one for _, one in ordered if first[one.laws[0].effect.name] is one][:2]
+    return [one for i, (odds, one) in enumerate(ordered) if i < 2 or odds > least or one in anyway]
 
 
 def promising(ranked: Sequence[Ranked], parent: Hypothesis) -> list[Ranked]:
@@ -128,8 +132,8 @@ def promising(ranked: Sequence[Ranked], parent: Hypothesis) -> list[Ranked]:
 
 
 def cold_starts(ranked: Sequence[Ranked], parent: Hypothesis) -> list[tuple[tuple[Attached, ...], Floats]]:
-    """Each law that the parent lacks, at a modest size, on all sites that have a size of their own: which of them it is
-    on, a fit that is bent cannot say. Another one on the sites that promise most."""
+    """Each law that the parent lacks, at a modest size, on all sites that have a size of their own; another one on each
+    choice of them: which of them it is on, a fit that is bent cannot say."""
     has = {a.effect.name for a in parent.laws}
     of: dict[str, list[Ranked]] = {}
     for r in ranked:
@@ -137,9 +141,10 @@ def cold_starts(ranked: Sequence[Ranked], parent: Hypothesis) -> list[tuple[tupl
             of.setdefault(r.candidate.name, []).append(r)
     out = []
     for same in of.values():
-        chosen = [r for r in same if _separate(r.candidate, parent.simulator.moving)] or same[:1]
-        parts = tuple(part for r in chosen for part in r.candidate.parts)
-        out.append((parts, np.concatenate([modest(r) for r in chosen])))
+        own = [r for r in same if _separate(r.candidate, parent.simulator.moving)]
+        for chosen in [own] if own else [[r] for r in same]:
+            parts = tuple(part for r in chosen for part in r.candidate.parts)
+            out.append((parts, np.concatenate([modest(r) for r in chosen])))
     return out
 
 

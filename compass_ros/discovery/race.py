@@ -33,8 +33,8 @@ def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats
     A simulator without a law bends other parameters to stand for it, and from there a fit may end in a valley beside
     the right one. So the parent is fitted anew from the cell's first guess, to the beginning of each episode and to
     more and more of it, until a free discrepancy is called for: the fit before that is not bent yet. From there each
-    law goes on, to the next horizon the better third of them and all that are as likely as SLIGHT of the best.
-    `starts`: each law with its (q,) numbers.
+    law goes on, to the next horizon the better third of them, each on its best sites, and all that are as likely as
+    SLIGHT of the best. `starts`: each law with its (q,) numbers; of one law there may be several, on other sites.
     """
     if not starts:
         return []
@@ -49,19 +49,23 @@ def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats
         for i in alive:
             found[i] = next(runners[i])
         alive = sorted(alive, key=lambda i: found[i][1].point.cost)
-        last = max(len(alive) // ETA, 2)
+        best: dict[str, int] = {}  # of each law
+        for i in alive:
+            best.setdefault(starts[i][0][0].effect.name, i)
+        ahead = list(best.values())[: max(len(best) // ETA, 2)]
         least = found[alive[0]][1].point.cost - log(SLIGHT)
-        alive = [i for k, i in enumerate(alive) if k < last or found[i][1].point.cost < least]
+        alive = [i for i in alive if i in ahead or found[i][1].point.cost < least]
     return [_at_the_end(parent, *_on_its_sites(parent, starts[i][0], *found[i])) for i in alive]
 
 
 def _on_its_sites(
     parent: Hypothesis, laws: tuple[Attached, ...], likelihood: Likelihood, fit: Fit
 ) -> tuple[tuple[Attached, ...], Likelihood, Point]:
-    """A law that raced on several sites without those where it may be absent, if that leaves any."""
+    """A law that raced on several sites without those where it may be absent, if that leaves any; of what these
+    episodes do not show, others decide."""
     simulator, _ = widened(parent.simulator, parent.likelihood, laws)
     model = Hypothesis((*parent.laws, *laws), simulator, likelihood, fit)
-    absent = model.zero.absent(laws) if len(laws) > 1 else ()
+    absent = model.zero.absent([a for a in laws if model.zero.shown(a)]) if len(laws) > 1 else ()
     if not 0 < len(absent) < len(laws):
         return laws, likelihood, fit.point
     _, fewer, at = lacking(model, absent)

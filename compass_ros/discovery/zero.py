@@ -29,6 +29,8 @@ class Zero:
     """(p,) how far each number is from where it is absent, in standard deviations of the prior."""
     errors: tuple[Floats, ...]
     """(p, p) covariances: by the noise, and by what the episodes disagree on."""
+    told: Floats
+    """(p,) share of each number's direction (squared) along which the recordings say more than the prior."""
 
     @property
     def weakest(self) -> tuple[Attached, ...]:
@@ -51,6 +53,10 @@ class Zero:
         noise = replace(self, errors=self.errors[:1])
         order = noise.nearest_first(laws)
         return next((tuple(order[:n]) for n in range(len(order), 0, -1) if noise.may_lack(order[:n])), ())
+
+    def shown(self, law: Attached) -> bool:
+        """Whether the recordings say more of its amplitudes than the prior does, for the most part."""
+        return any(a is law and bool(np.all(self.told[own] > 0.5)) for a, own in self.laws)
 
     def nearest_first(self, laws: Sequence[Attached]) -> list[Attached]:
         """Laws by how far each alone is from zero in its error bars."""
@@ -91,7 +97,7 @@ def zero(likelihood: Likelihood, fit: Fit, laws: Sequence[tuple[Attached, slice]
     bars = tuple(axes @ (axes.T @ cov @ axes) @ axes.T for cov in (errors, jackknife(likelihood, held)))
     places = [(a, own.start + np.flatnonzero(a.amplitudes)) for a, own in laws if not a.effect.scattered]
     away = ((fit.point.values - likelihood.prior_mean) / likelihood.prior_std)[free]
-    return Zero(tuple((a, np.flatnonzero(np.isin(free, at))) for a, at in places), away, bars)
+    return Zero(tuple((a, np.flatnonzero(np.isin(free, at))) for a, at in places), away, bars, np.sum(axes**2, axis=1))
 
 
 def _squared(away: Floats, errors: Floats) -> float:

@@ -39,11 +39,33 @@ def test_of_two_laws_that_do_the_same_one_stays() -> None:
     assert left.zero.weakest == ()
 
 
+def test_a_wall_that_no_shot_touches_is_left_to_others() -> None:
+    """Where nothing is shown, nothing is absent. Oracle: what another offset of a wall does to the recordings."""
+    drag = Attached(effect("viscous_drag"), PUCKS)
+    plain = response_of(recorded(drag, [0.0]))
+    laws = [Attached(effect("local_wall"), (wall,)) for wall in plain.simulator.places.walls]
+    simulator, wider = widened(plain.simulator, plain.likelihood, laws)
+    cells = len(plain.likelihood.parameters)
+    point, amplitudes = start(wider, wider.prior_mean), np.concatenate([law.amplitudes for law in laws])
+    free = np.concatenate([plain.fit.free, cells + np.flatnonzero(amplitudes)])
+    model = Hypothesis(tuple(laws), simulator, wider, minimise(wider, point, free, 2, 4.0))
+    shown = []
+    for _, own in model.own():
+        values = np.stack([wider.prior_mean] * 2)
+        values[1, own.start] += 0.002
+        many = [np.repeat(values[i : i + 1], len(wider.inputs), axis=0) for i in range(2)]
+        seen = [simulator.observe(one, wider.inputs, wider.time_s) for one in many]
+        shown.append(bool(np.nanmax(np.abs(seen[1] - seen[0]) / wider.sigma) > 1))
+    assert [model.zero.shown(law) for law in laws] == shown
+    assert {True, False} == set(shown)
+
+
 def sites(away: Sequence[float], bars: Floats, episodes: Floats | None = None) -> tuple[list[Attached], Zero]:
     """Coulomb friction on as many joints, each with a size, and which may be zero by the noise and by the episodes."""
     own = [Attached(effect("coulomb_friction").at(unit_joint("hinge")), (f"j{i}",)) for i in range(len(away))]
     at = tuple((a, np.array([i])) for i, a in enumerate(own))
-    return own, Zero(at, np.array(away), (bars, np.zeros_like(bars) if episodes is None else episodes))
+    errors = (bars, np.zeros_like(bars) if episodes is None else episodes)
+    return own, Zero(at, np.array(away), errors, np.ones(len(away)))
 
 
 def test_a_law_that_raced_on_all_joints_stays_where_it_is() -> None:
