@@ -50,6 +50,8 @@ def write_calibration(
         replays=(),
         cancelled=cancelled,
         unit=unit,
+        time_step_s=cell.time_step,
+        friction_holds=cell.holds,
     )
     folder.mkdir(parents=True)
     write_scene(cell, values, folder / "scene.xml")

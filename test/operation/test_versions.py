@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -45,6 +46,12 @@ def test_apply_and_revert_go_through_the_versions_and_keep_them(cell: Cell, vers
     assert three.number == 3, "a number is never given twice"
     assert Versions(tmp_path / "versions", "air_hockey").applied() == three, "a process that starts later knows"
     assert sorted(path.name for path in versions.folder.iterdir()) == ["0001", "0002", "0003", "state.yaml"]
+
+
+def test_a_version_is_simulated_with_its_own_numerics(cell: Cell, tmp_path: Path) -> None:
+    other = replace(cell, time_step=0.0005, holds=True)
+    assert current(cell, write_calibration(tmp_path / "one", other, {})).simulator.cell == other
+    assert current(cell, write_calibration(tmp_path / "two", cell, {})).simulator.cell == cell
 
 
 def test_what_the_scene_is_made_of_goes_with_it(cell: Cell, versions: Versions, tmp_path: Path) -> None:
