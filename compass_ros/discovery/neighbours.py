@@ -11,8 +11,8 @@ from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.discrepancy import to_first_order
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.fits import Begun, from_parent, telling, whole
-from compass_ros.discovery.hypothesis import Hypothesis, name_of
-from compass_ros.discovery.odds import Known, Prior
+from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.odds import Known, Prior, Weighed
 from compass_ros.discovery.race import race
 from compass_ros.discovery.scatter import ranked_scatter, with_scatter
 from compass_ros.discovery.settings import SLIGHT
@@ -67,30 +67,47 @@ def widen(known: Known, best: Hypothesis, ranked: Sequence[Ranked], called: bool
     known.take(whole(best, one) for one in probable(begun, known.prior))
 
 
-def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str], called: bool, least: float) -> None:
+def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str], unknown: float, least: float) -> None:
     """Fit models with another law in the place of one of the best model's, until none is better.
 
-    The first law that was taken stood for all that differs; beside the second one another may stand for the rest.
-    `widened`: names of models whose neighbours were fitted; those of this search are added. `called`: as in `widen`.
-    `least`: log odds up to which, to first order, a model is not worth a fit.
+    The first law that was taken stood for all that differs; beside the second one another may stand for the rest. Where
+    the best model is refuted, its first law may be the wrong one: so it is with the best of those with most laws, be it
+    better than with fewer or not, and first order about a model that lacks another law excludes nothing.
+    `widened`: names of models whose neighbours were fitted; those of this search are added. `unknown`: log odds of a
+    free discrepancy. `least`: log odds up to which, to first order, a model that may have no law more is not worth a
+    fit.
     """
-    leader = None
-    while known.ordered and known.ordered[0][0] is not leader:
-        leader, odds = known.ordered[0]
+    last: Hypothesis | None = None
+    while known.ordered:
+        best, odds = known.ordered[0]
+        refuted = odds < unknown and least == -np.inf
+        leader = _deepest(known) if refuted else best
+        if leader is last:
+            break
+        last = leader
         for name in dict.fromkeys(a.effect.name for a in leader.laws):
-            own = [a for a in leader.laws if a.effect.name == name]
-            rest = name_of([a for a in leader.laws if a not in own])
-            if rest in widened:
-                continue
-            widened.add(rest)
-            known_rest = known.without(leader, own)
-            if known_rest is None:
+            known_rest = _rest(known, leader, name)
+            if known_rest is None or known_rest[0].name in widened:
                 continue
             less, of_less = known_rest
+            widened.add(less.name)
             ranked = rank(FirstOrder(less.response), candidates)
-            worth = max(odds, least)
-            better = [r for r in ranked if of_less + r.gain + known.prior.of_laws([r.candidate.name]) > worth]
-            widen(known, less, better, called)
+            worth, price = max(odds, least), known.prior.of_laws
+            better = [r for r in ranked if refuted or of_less + r.gain + price([r.candidate.name]) > worth]
+            widen(known, less, better, unknown > 0)
+
+
+def _deepest(known: Known) -> Hypothesis:
+    """The most probable model among those with most laws by name."""
+    return max((model for model, _ in known.ordered), key=lambda model: len({a.effect.name for a in model.laws}))
+
+
+def _rest(known: Known, model: Hypothesis, name: str) -> Weighed | None:
+    """The best model with the laws of another one but for one of them: that law's sites stood for its own."""
+    own = [a for a in model.laws if a.effect.name == name]
+    names = {a.effect.name for a in model.laws} - {name}
+    alike = (one for one in known.ordered if {a.effect.name for a in one[0].laws} == names)
+    return next(alike, None) or (known.without(model, own) if names else None)
 
 
 def beside(model: Hypothesis, ranked: Sequence[Ranked], prior: Prior) -> list[float]:

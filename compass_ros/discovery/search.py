@@ -68,7 +68,7 @@ def search(
     while ranked:
         widen(known, best, ranked, found.unknown > 0)
         finish(known, others)
-        exchange(known, candidates, widened, found.unknown > 0, least)
+        exchange(known, candidates, widened, found.unknown, least)
         finish(known, others)
         if not known.models:
             break  # nothing gains to first order, and no beginning calls for anything

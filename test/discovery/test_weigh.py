@@ -155,12 +155,12 @@ def test_a_law_that_stood_for_another_is_exchanged(tmp_path: Path, monkeypatch: 
     wrong = grown(grown(plain, "quadratic_drag"), "actuation_delay")
     unmatched = Known(Prior.of(asked), plain.free.alone, {}, set())
     unmatched.take([wrong])
-    exchange(unmatched, asked, {plain.name}, called=True, least=np.inf)
+    exchange(unmatched, asked, {plain.name}, unknown=1.0, least=np.inf)
     left = {a.effect.name for model, _ in unmatched.ordered for a in model.laws}
     assert left == {"quadratic_drag", "actuation_delay"}  # no other law could reach what is asked for
     known = Known(Prior.of(asked), plain.free.alone, {}, set())
     known.take([wrong])
-    exchange(known, asked, {plain.name}, called=True, least=-np.inf)
+    exchange(known, asked, {plain.name}, unknown=1.0, least=-np.inf)
     best, odds = known.ordered[0]
     assert {a.effect.name for a in best.laws} == {"coulomb_friction", "actuation_delay"}
     assert odds > known.models[wrong.name][1] + 10

@@ -26,6 +26,7 @@ from compass_ros.transfer.loop import LoopConfig, run_loop
 TASK = air_hockey()
 
 
+@pytest.mark.nightly
 def test_a_loop_leaves_policies_bags_and_rounds(tmp_path: Path) -> None:
     config = LoopConfig("uniform", rounds=1, recordings=4, fresh=2, rollouts=64, judged=3)
     rows = run_loop(TASK, "low", config, tmp_path, threads=1)

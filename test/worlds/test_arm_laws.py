@@ -50,6 +50,7 @@ def width(law: Law, rate: float, effort: float = 0.0, q: float = 0.0, time_s: fl
     return float(lower[0, 0]), float(upper[0, 0])
 
 
+@pytest.mark.nightly
 def test_lugre_slides_on_stribecks_curve_and_is_a_spring_before() -> None:
     law = LuGre((0,), one(0.12), one(0.2), one(0.05), one(0.001), one(0.3))
     own = law.fitted(arm())
@@ -206,6 +207,7 @@ def test_a_payload_adds_the_energy_of_a_ball() -> None:
     assert np.allclose(more, mass_matrix(q, np.zeros(2), *ball.chain), rtol=1e-9)
 
 
+@pytest.mark.nightly
 def test_a_tilt_about_the_first_axis_is_an_offset_of_that_joint() -> None:
     own = arm()
     tilted = TiltedBase((), one(0.0, 0.02)).fitted(own)

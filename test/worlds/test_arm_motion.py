@@ -47,6 +47,7 @@ def heights(own: Arm, q: Floats) -> Floats:
     return np.array(found)
 
 
+@pytest.mark.nightly
 def test_energy_stays_without_friction() -> None:
     own = frictionless(arm())
     drive = Drive(None, np.array([[1.2, -0.9], [0.4, 1.5]]), 0.0, 2.0, 500.0, np.zeros(2))

@@ -38,6 +38,7 @@ def test_bars_are_pushed_as_in_the_simulator_with_their_parameters() -> None:
     assert np.abs(seen[1] - said[1]).max() < 2e-3
 
 
+@pytest.mark.nightly
 def test_two_velocities_told_step_by_step_are_a_recorded_push() -> None:
     _, task = task_of("pushed_bar")
     command = np.array([[0.0, 0.2, 0.02, 0.3, -0.02]])

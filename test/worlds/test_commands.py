@@ -59,6 +59,7 @@ def true(folder: Path, answers: Path) -> tuple[Any, ...]:
     return answer["parameters"], laws
 
 
+@pytest.mark.nightly
 def test_one_shot_more_of_a_sealed_world(tmp_path: Path) -> None:
     (tmp_path / SHOT).write_text("shots:\n- {x: -0.25, y: 0.05, angle: 0.1, velocity: 0.4}\n", encoding="utf-8")
     answers = tmp_path / "answers"
