@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from compass_ros.posing import Posed
 from compass_ros.progress import Steady
 from compass_ros.selection import evenly, split, unlike
 from compass_ros.simulation import Simulator
+from compass_ros.simulation.numerics import unlike_scene
 from compass_ros.simulation.replay import recordings
 from compass_ros.simulation.windows import usable, windows
 from compass_ros.types import Episode, Estimate, Report, Result, silent
@@ -47,19 +48,8 @@ def calibrate(
     """
     result, found = _calibrate(episodes, cell, config, report, keep)
     while found.instead is not None:
-        cell = found.instead
-        result, found = _calibrate(episodes, cell, config, report, keep)
-    return replace(result, warnings=(*other_numerics(cell), *result.warnings)), found
-
-
-def other_numerics(cell: Cell) -> Iterator[str]:
-    """In which numerics a simulation is not the scene's, and why."""
-    if cell.holds:
-        said = "simulated with dry friction that holds a joint at rest, which the scene should have (solreffriction, "
-        yield f"{said}solimpfriction): with its own, joints creep that stand still in the recordings"
-    if cell.time_step is not None:
-        said = f"simulated with time steps of {1e3 * cell.time_step:g} ms, which the scene should have"
-        yield f"{said}: with its own, contacts are others than in the recordings"
+        result, found = _calibrate(episodes, found.instead, config, report, keep)
+    return result, found
 
 
 def _calibrate(
@@ -70,7 +60,7 @@ def _calibrate(
     used, steady = evenly(sound, config.episodes), Steady(report)
     first = CALIBRATION if config.discover else 1.0
     simulator = Simulator(cell, threads=config.threads)
-    told: list[str] = []
+    told = list(unlike_scene(cell))
     left_out = (*checked.left_out, *without_motion)
 
     def noted(one: Result) -> Result:

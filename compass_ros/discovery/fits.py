@@ -16,7 +16,7 @@ from compass_ros.calibration.residuals import typical_residual
 from compass_ros.calibration.settle import settled
 from compass_ros.discovery.evidence import solve
 from compass_ros.discovery.first_order import WIDTH, Ranked
-from compass_ros.discovery.hypothesis import Hypothesis, widened
+from compass_ros.discovery.hypothesis import Hypothesis, played, widened
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats, Ints
@@ -119,29 +119,42 @@ def whole(parent: Hypothesis, begun: Begun) -> Hypothesis:
     """
     simulator, likelihood = widened(parent.simulator, parent.likelihood, begun.laws)
     free, steps = with_law(parent, begun.point.values)
-    point, linear = begun.point, begun.linear
-    if linear is None:
-        point = Point(point.values, parent.fit.point.launch, np.inf)
-        if begun.bent:
-            (residual,) = cost(likelihood, [point], parent.fit.robust)[1]
-            linear = extended(parent.fit.linear, likelihood, point, residual, free)
-    robust = 3.0 * typical_residual(likelihood, point)
-    if not begun.bent:
-        point = _grown(likelihood, point.values, free, steps, begun.laws)
-    elif robust > parent.fit.robust:  # what these episodes did not hold is far off
-        point = minimise(likelihood, point, free, FEW, robust, 3.0, linear, fresh=False, steps=steps).point
-        linear = None
+    if begun.bent:
+        point, linear = _near_parent(parent, begun, likelihood, free, steps)
+    else:
+        point, linear = _grown(parent, begun, likelihood, free, steps), None
     fit = minimise(likelihood, point, free, FEW, parent.fit.robust, _LAST, linear, steps=steps)
     return Hypothesis((*parent.laws, *begun.laws), simulator, likelihood, fit, without=parent.bare)
 
 
-def _grown(likelihood: Likelihood, values: Floats, free: Ints, steps: Floats, laws: Sequence[Attached]) -> Point:
-    """All that is free, but for the shapes of the last laws, fitted on a growing horizon of all episodes."""
-    wide, amplitude = np.ones(len(values)), np.concatenate([a.amplitudes for a in laws])
+def _near_parent(
+    parent: Hypothesis, begun: Begun, likelihood: Likelihood, free: Ints, steps: Floats
+) -> tuple[Point, Linear | None]:
+    """Where all episodes go on from a fit to some of them, and differences near it; None: they have to be taken."""
+    point, linear = begun.point, begun.linear
+    if linear is None:
+        point = Point(point.values, parent.fit.point.launch, np.inf)
+        (residual,) = cost(likelihood, [point], parent.fit.robust)[1]
+        linear = extended(parent.fit.linear, likelihood, point, residual, free)
+    robust = 3.0 * typical_residual(likelihood, point)
+    if robust > parent.fit.robust:  # what these episodes did not hold is far off
+        return minimise(likelihood, point, free, FEW, robust, 3.0, linear, fresh=False, steps=steps).point, None
+    return point, linear
+
+
+def _grown(parent: Hypothesis, begun: Begun, likelihood: Likelihood, free: Ints, steps: Floats) -> Point:
+    """All that is free, but for the shapes of the law that begins, fitted on a growing horizon of all episodes."""
+    values = begun.point.values
+    wide = np.ones(len(values))
     wide[free] = steps
-    shapes = len(values) - len(amplitude) + np.flatnonzero(~amplitude)
-    *_, (_, fit) = growing(likelihood, values, shapes, Strongest(free, wide))
+    held = len(parent.fit.point.values) + shapes(begun.laws)
+    *_, (_, fit) = growing(likelihood, values, held, Strongest(free, wide))
     return fit.point
+
+
+def shapes(laws: Sequence[Attached]) -> Ints:
+    """Places of shapes among the numbers of laws."""
+    return np.flatnonzero(~np.concatenate([np.empty(0, bool), *(a.amplitudes for a in laws)]))
 
 
 def finished(hypothesis: Hypothesis) -> Hypothesis:
@@ -168,12 +181,5 @@ def lacking(model: Hypothesis, laws: Sequence[Attached]) -> tuple[Simulator, Lik
     at = np.concatenate([np.arange(cell), *numbers])
     simulator = model.simulator.with_effects([a for a in model.simulator.effects if a not in laws])
     of_all = model.likelihood
-    likelihood = replace(
-        of_all,
-        predict=simulator.observe,
-        predict_alike=simulator.observe_alike,
-        parameters=simulator.parameters,
-        prior_mean=of_all.prior_mean[at],
-        prior_std=of_all.prior_std[at],
-    )
-    return simulator, likelihood, at
+    prior = {"prior_mean": of_all.prior_mean[at], "prior_std": of_all.prior_std[at]}
+    return simulator, replace(played(of_all, simulator), **prior), at

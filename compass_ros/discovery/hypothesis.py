@@ -166,6 +166,16 @@ class Hypothesis:
         return self._with_law[1] if self.laws else 0.0
 
 
+def played(likelihood: Likelihood, simulator: Simulator) -> Likelihood:
+    """The same recordings beside another simulator; its priors are for the caller to say where it has other numbers."""
+    return replace(
+        likelihood,
+        predict=simulator.observe,
+        predict_alike=simulator.observe_alike,
+        parameters=simulator.parameters,
+    )
+
+
 def widened(simulator: Simulator, likelihood: Likelihood, added: Sequence[Attached]) -> tuple[Simulator, Likelihood]:
     """A simulator and likelihood with more effects; priors wide beside a modest effect, bounded by what is physical."""
     wider = simulator.with_effects([*simulator.effects, *added])
@@ -174,10 +184,7 @@ def widened(simulator: Simulator, likelihood: Likelihood, added: Sequence[Attach
     std = [WIDTH * q.scale if q.amplitude else (q.high - q.low) / 4 for q in quantities]
     more = sum(a.effect.scattered for a in added)
     return wider, replace(
-        likelihood,
-        predict=wider.observe,
-        predict_alike=wider.observe_alike,
-        parameters=wider.parameters,
+        played(likelihood, wider),
         inputs=np.pad(likelihood.inputs, ((0, 0), (0, more))),
         launch_std=np.pad(likelihood.launch_std, (0, more)),
         prior_mean=np.concatenate([likelihood.prior_mean, mean]),

@@ -13,7 +13,7 @@ from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.fits import Begun, from_parent, telling, whole
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.odds import Known, Prior, Weighed
-from compass_ros.discovery.race import race
+from compass_ros.discovery.race import first_of_each, race
 from compass_ros.discovery.scatter import ranked_scatter, with_scatter
 from compass_ros.discovery.settings import SLIGHT
 from compass_ros.simulation.effects import Attached
@@ -103,7 +103,8 @@ def _deepest(known: Known) -> Hypothesis:
 
 
 def _rest(known: Known, model: Hypothesis, name: str) -> Weighed | None:
-    """The best model with the laws of another one but for one of them: that law's sites stood for its own."""
+    """The best model with the laws of another one but for one of them; what is left of that one lacks the sites that
+    this law had made seem idle."""
     own = [a for a in model.laws if a.effect.name == name]
     names = {a.effect.name for a in model.laws} - {name}
     alike = (one for one in known.ordered if {a.effect.name for a in one[0].laws} == names)
@@ -132,9 +133,8 @@ def probable(begun: Sequence[Begun], prior: Prior) -> list[Begun]:
             best[sites] = odds, one
     ordered = sorted(best.values(), key=lambda pair: -pair[0])
     least = ordered[0][0] + 2 * log(SLIGHT) if ordered else 0.0
-    first = {one.laws[0].effect.name: one for _, one in reversed(ordered)}
-    anyway = [one for _, one in ordered if first[one.laws[0].effect.name] is one][:2]
-    return [one for i, (odds, one) in enumerate(ordered) if i < 2 or odds > least or one in anyway]
+    best_laws = first_of_each(ordered, lambda pair: pair[1].laws[0].effect.name)[:2]
+    return [pair[1] for i, pair in enumerate(ordered) if i < 2 or pair[0] > least or pair in best_laws]
 
 
 def promising(ranked: Sequence[Ranked], parent: Hypothesis) -> list[Ranked]:

@@ -11,7 +11,7 @@ from compass_ros.calibration.least_squares import minimise, normal_equations
 from compass_ros.calibration.residuals import residual_at
 from compass_ros.cells import Cell
 from compass_ros.discovery.evidence import solve
-from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.hypothesis import Hypothesis, played
 from compass_ros.discovery.nuisances import creeping_joints, finite_step, moved_by
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.numerics import other_numerics
@@ -71,7 +71,8 @@ def friction_that_holds(plain: Hypothesis, threshold: float) -> Cell | None:
     other = _simulated(plain, held, np.zeros(1), threshold, threshold)
     if other is None or _gained(plain, other) <= threshold:
         return None
-    return held if other.free.alone - plain.free.alone > threshold else None
+    tangent = other.response.tangent
+    return held if solve(tangent, tangent.normal, None).log - plain.free.alone > threshold else None
 
 
 def _simulated(plain: Hypothesis, cell: Cell, foretold: Floats, surprise: float, best: float) -> Hypothesis | None:
@@ -79,15 +80,15 @@ def _simulated(plain: Hypothesis, cell: Cell, foretold: Floats, surprise: float,
     likelihood, or do what is `foretold` (E, F, C) but for less than the `surprise` [log odds]."""
     simulator, likelihood, fit = plain.simulator, plain.likelihood, plain.fit
     other = Simulator(cell, threads=simulator.threads).driven(simulator.physics.bank)
-    played = replace(likelihood, predict=other.observe, predict_alike=other.observe_alike)
+    beside = played(likelihood, other)
     residual, kappa = fit.linear.residual, likelihood.correlation_time
-    moved = residual_at(played, fit.point) - residual
+    moved = residual_at(beside, fit.point) - residual
     if 0.5 * float(np.sum((moved - foretold) ** 2)) / kappa < surprise:
         return None
     weighted = np.sqrt(robust_weight(residual, fit.robust))
     if float(np.linalg.norm(weighted * residual) * np.linalg.norm(weighted * moved)) / kappa <= best:
         return None
-    return Hypothesis((), other, played, minimise(played, fit.point, fit.free, STEPS, fit.robust, 1.0))
+    return Hypothesis((), other, beside, minimise(beside, fit.point, fit.free, STEPS, fit.robust, 1.0))
 
 
 def _gained(plain: Hypothesis, other: Hypothesis) -> float:

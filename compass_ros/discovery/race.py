@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from math import log
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,13 +17,14 @@ from compass_ros.calibration.refine import Strongest, growing, strongest
 from compass_ros.calibration.residuals import typical_residual
 from compass_ros.discovery.discrepancy import free
 from compass_ros.discovery.first_order import WIDTH
-from compass_ros.discovery.fits import FEW, Begun, lacking, with_law
+from compass_ros.discovery.fits import FEW, Begun, lacking, shapes, with_law
 from compass_ros.discovery.hypothesis import Hypothesis, widened
 from compass_ros.discovery.response import respond
 from compass_ros.discovery.settings import PRIOR_UNKNOWN, SLIGHT
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats, Ints
 
+Runner = TypeVar("Runner")
 ETA = 3
 """One in so many goes on (Li et al. 2018, Hyperband: 3 or 4)."""
 
@@ -49,10 +51,8 @@ def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats
         for i in alive:
             found[i] = next(runners[i])
         alive = sorted(alive, key=lambda i: found[i][1].point.cost)
-        best: dict[str, int] = {}  # of each law
-        for i in alive:
-            best.setdefault(starts[i][0][0].effect.name, i)
-        ahead = list(best.values())[: max(len(best) // ETA, 2)]
+        of_each = first_of_each(alive, lambda i: starts[i][0][0].effect.name)
+        ahead = of_each[: max(len(of_each) // ETA, 2)]
         least = found[alive[0]][1].point.cost - log(SLIGHT)
         alive = [i for i in alive if i in ahead or found[i][1].point.cost < least]
     return [_at_the_end(parent, *_on_its_sites(parent, starts[i][0], *found[i])) for i in alive]
@@ -89,9 +89,9 @@ def _unbent(parent: Hypothesis, rows: Ints) -> tuple[Floats, Strongest, tuple[fl
     likelihood, first = parent.likelihood.of(rows), len(parent.simulator.cell.parameters)
     values = parent.likelihood.prior_mean.copy()
     values[first:] = parent.fit.point.values[first:]
-    begun, shapes = strongest(likelihood, values), first + _shapes(parent.laws)
+    begun, held = strongest(likelihood, values), first + shapes(parent.laws)
     horizons, steps = likelihood.horizons, difference_steps(parent.fit.linear)
-    for k, (part, rough) in enumerate(growing(likelihood, values, shapes, begun)):
+    for k, (part, rough) in enumerate(growing(likelihood, values, held, begun)):
         fit = minimise(part, rough.point, parent.fit.free, 2 * FEW, parent.fit.robust, 1.0, steps=steps, fresh=False)
         found = free(respond(parent.simulator, part, fit))
         if found.log + PRIOR_UNKNOWN > found.alone:
@@ -111,11 +111,14 @@ def _runner(
     """Fits of one model to some episodes, longer from one to the next; shapes stay as they are."""
     simulator, likelihood = widened(parent.simulator, parent.likelihood, laws)
     new = len(parent.fit.point.values) + np.flatnonzero(np.concatenate([a.amplitudes for a in laws]))
-    held = len(simulator.cell.parameters) + _shapes((*parent.laws, *laws))
+    held = len(simulator.cell.parameters) + shapes((*parent.laws, *laws))
     begun = begun.beside(values, new, np.full(len(new), 1 / WIDTH))
     return growing(likelihood.of(rows), values, held, begun, horizons)
 
 
-def _shapes(laws: Sequence[Attached]) -> Ints:
-    """Places of shapes among the numbers of laws."""
-    return np.flatnonzero(~np.concatenate([np.empty(0, bool), *(a.amplitudes for a in laws)]))
+def first_of_each(ordered: Iterable[Runner], name: Callable[[Runner], str]) -> list[Runner]:
+    """The first of each name, in their order."""
+    found: dict[str, Runner] = {}
+    for one in ordered:
+        found.setdefault(name(one), one)
+    return list(found.values())

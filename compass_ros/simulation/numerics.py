@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import mujoco
 import numpy as np
 
+from compass_ros.cells import Cell
 from compass_ros.cells.rotors import PREFIX
 from compass_ros.types import Floats
 
@@ -63,6 +64,16 @@ def _harder(impedance: Floats, share: float) -> Floats:
 def creeping(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[str, ...]:
     """Which of these joints have dry friction by MuJoCo's soft constraint, which creeps under load."""
     return tuple(joint for joint in joints if model.dof_frictionloss[model.joint(joint).dofadr[0]] > 0)
+
+
+def unlike_scene(cell: Cell) -> Iterator[str]:
+    """In which numerics a cell is not simulated as its scene says, and why."""
+    if cell.holds:
+        said = "simulated with dry friction that holds a joint at rest, which the scene should have (solreffriction, "
+        yield f"{said}solimpfriction): with its own, joints creep that stand still in the recordings"
+    if cell.time_step is not None:
+        said = f"simulated with time steps of {1e3 * cell.time_step:g} ms, which the scene should have"
+        yield f"{said}: with its own, contacts are others than in the recordings"
 
 
 def other_numerics(option: mujoco.MjOption) -> Iterator[tuple[str, Mapping[str, float]]]:
