@@ -15,9 +15,10 @@ import pytest
 
 from compass_ros.cells import load
 from compass_ros.concealed.seal import unseal
+from compass_ros.demo.shared_memory import SHARED_MEMORY, held_locks, locks_in_use
 from compass_ros.episodes import find_bags, read_episodes
 from test.episodes.planted import PUCKS
-from test.nodes.harness import PATIENCE_S, SHARED_MEMORY, held_locks, locks_in_use, until
+from test.nodes.harness import PATIENCE_S, until
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 

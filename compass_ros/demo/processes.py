@@ -17,9 +17,9 @@ from typing import Any
 import yaml
 from domain_coordinator import domain_id
 
+from compass_ros.demo.shared_memory import held_locks, remove, remove_half_made_ports
 from compass_ros.errors import CompassError, ConfigError
 
-SHARED_MEMORY = Path("/dev/shm")
 PORTS_OF_DOMAIN = 250
 CHECK_S = 0.5
 """[s] How soon the end of a node is noticed."""
@@ -74,11 +74,11 @@ class NodeProcess:
         try:
             self.process.wait(max(deadline - time.monotonic(), 0.01))
         except subprocess.TimeoutExpired:
-            locks = _held_locks(self.process.pid)
+            locks = held_locks(self.process.pid)
             os.killpg(self.process.pid, signal.SIGKILL)
             self.process.wait()
             for lock in locks:
-                _remove(lock.name.removesuffix("_el"))
+                remove(lock.name.removesuffix("_el"))
         if self.process.stdout is not None:
             self.process.stdout.close()
 
@@ -97,6 +97,7 @@ class NodeGroup:
 
     def __enter__(self) -> NodeGroup:
         self._domain = self._coordinator.__enter__()
+        remove_half_made_ports()
         return self
 
     def __exit__(
@@ -107,7 +108,7 @@ class NodeGroup:
             self.stop(*self._nodes)
             first = FIRST_PORT + PORTS_OF_DOMAIN * self._domain
             for port in range(first, first + PORTS_OF_DOMAIN):
-                _remove(f"fastrtps_port{port}")
+                remove(f"fastrtps_port{port}")
         finally:
             signal.signal(signal.SIGINT, impatient)
             self._coordinator.__exit__(kind, error, trace)
@@ -174,20 +175,3 @@ def _lines(node: NodeProcess, others: Sequence[NodeProcess]) -> Iterator[bytes]:
             return
         *whole, rest = (rest + read).split(b"\n")
         yield from whole
-
-
-def _held_locks(pid: int) -> list[Path]:
-    """The lock files by which a process owns segments and ports of Fast DDS."""
-    held = []
-    for descriptor in Path(f"/proc/{pid}/fd").iterdir():
-        try:
-            held.append(descriptor.readlink())
-        except FileNotFoundError:
-            continue  # closed in the meantime
-    return [path for path in held if path.parent == SHARED_MEMORY and path.name.endswith("_el")]
-
-
-def _remove(name: str) -> None:
-    """Remove one segment or port of Fast DDS whose owner is dead."""
-    for file in (name, f"{name}_el", f"{name}_sl", f"sem.{name}_mutex"):
-        (SHARED_MEMORY / file).unlink(missing_ok=True)

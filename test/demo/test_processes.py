@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from compass_ros.demo.processes import SHARED_MEMORY, NodeError, NodeGroup, shared_file
+from compass_ros.demo.processes import NodeError, NodeGroup, shared_file
+from compass_ros.demo.shared_memory import SHARED_MEMORY, held_locks
 from compass_ros.errors import ConfigError
-from test.nodes.harness import held_locks, until
+from test.nodes.harness import until
 
 
 def test_files_of_the_suite_are_found() -> None:

@@ -9,8 +9,9 @@ from typing import Any, Protocol
 import pytest
 from domain_coordinator import domain_id
 
+from compass_ros.demo.shared_memory import remove, remove_half_made_ports
 from test.nodes.episodes import TOPIC
-from test.nodes.harness import NodeProcess, Probe, remove_shared_memory
+from test.nodes.harness import NodeProcess, Probe
 
 ROOT = Path(__file__).parents[2]
 
@@ -29,9 +30,10 @@ def domain() -> Iterator[int]:
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         patch.setenv("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
         patch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", str(ROOT / "config" / "fastdds.xml"))
+        remove_half_made_ports()
         yield number
         for port in range(7400 + 250 * number, 7400 + 250 * (number + 1)):  # of this domain, by the standard of RTPS
-            remove_shared_memory(f"fastrtps_port{port}")
+            remove(f"fastrtps_port{port}")
 
 
 @pytest.fixture

@@ -21,12 +21,13 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from rclpy.task import Future
 
+from compass_ros.demo.shared_memory import held_locks, remove
+
 Message = TypeVar("Message")
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=ReliabilityPolicy.RELIABLE)
 RELIABLE = QoSProfile(depth=100)
 SENSOR = qos_profile_sensor_data
-SHARED_MEMORY = Path("/dev/shm")
 PATIENCE_S = 180.0
 """How long a test waits for what must come. A machine may be slow; where all is well, nobody waits."""
 
@@ -40,37 +41,6 @@ def until(condition: Callable[[], bool], what: str, timeout_s: float = PATIENCE_
     while not condition():
         assert time.monotonic() < deadline, f"waited {timeout_s} s for {what}"
         time.sleep(0.01)
-
-
-def held_locks(pid: int) -> list[Path]:
-    """The lock files by which a process owns segments and ports of Fast DDS; `fastdds shm clean` goes by them too.
-
-    That tool looks at all processes on the machine and can hit one that is just starting; this looks at one alone.
-    """
-    held = []
-    for descriptor in Path(f"/proc/{pid}/fd").iterdir():
-        try:
-            held.append(descriptor.readlink())
-        except FileNotFoundError:
-            continue  # closed in the meantime
-    return [path for path in held if path.parent == SHARED_MEMORY and path.name.endswith("_el")]
-
-
-def locks_in_use() -> set[Path]:
-    """The lock files that any process of this machine holds now."""
-    held: set[Path] = set()
-    for process in Path("/proc").glob("[0-9]*"):
-        try:
-            held.update(held_locks(int(process.name)))
-        except (FileNotFoundError, ProcessLookupError, PermissionError):
-            continue  # ended in the meantime, or another user's
-    return held
-
-
-def remove_shared_memory(name: str) -> None:
-    """Remove one segment or port of Fast DDS whose owner is dead."""
-    for file in (name, f"{name}_el", f"{name}_sl", f"sem.{name}_mutex"):
-        (SHARED_MEMORY / file).unlink(missing_ok=True)
 
 
 class NodeProcess:
@@ -105,7 +75,7 @@ class NodeProcess:
             os.killpg(self.process.pid, signal.SIGKILL)
             self.process.wait(PATIENCE_S)
             for lock in locks:
-                remove_shared_memory(lock.name.removesuffix("_el"))
+                remove(lock.name.removesuffix("_el"))
 
 
 class Probe:

@@ -20,8 +20,9 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from lifecycle_msgs.srv import GetState
 from rosgraph_msgs.msg import Clock
 
+from compass_ros.demo.shared_memory import held_locks
 from compass_ros.episodes import list_topics
-from test.nodes.harness import PATIENCE_S, RELIABLE, SENSOR, Probe, held_locks, until
+from test.nodes.harness import PATIENCE_S, RELIABLE, SENSOR, Probe, until
 from test.test_launch import Noted, description
 
 pytestmark = pytest.mark.ros
