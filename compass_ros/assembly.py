@@ -72,7 +72,7 @@ def assemble(
         graph=graph,
         mismatch=honest(
             found.mismatch if held_out else _unopened(found.mismatch),
-            gap["calibrated"]["held_out" if held_out else "fit"].rmse_m,
+            gap["with_effects" if "with_effects" in gap else "calibrated"]["held_out" if held_out else "fit"].rmse_m,
             floor,
             found.open_sigma,
         ),

@@ -18,7 +18,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-Unit = Literal["m", "rad"]
+Unit = Literal["m", "rad", "rad and mm"]
+"""Of an error over all that is tracked; its thousandth is shown. The last: angles and places in one number."""
 Quantity = Literal[
     "xy",
     "xyz",

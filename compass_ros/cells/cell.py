@@ -25,6 +25,8 @@ class Cell:
     hash: str
     rotors: tuple[str, ...] = ()
     """Joints whose motors are bodies of their own in the compiled scene (`cells/rotors.py`)."""
+    anchors: tuple[str, ...] = ()
+    """Joints whose dry friction may be a spring before it slides, with an anchor in the compiled scene."""
     time_step: float | None = None
     """Of the simulation where it is not the scene's [s]."""
     holds: bool = False

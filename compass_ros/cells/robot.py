@@ -67,6 +67,12 @@ class Robot:
     def joint(self, name: str) -> Joint:
         return next(j for j in self.joints if j.name == name)
 
+    @property
+    def coupled(self) -> tuple[str, ...]:
+        """Actuators that act on no single joint: on a tendon, a site or a body."""
+        own = {joint.actuator for joint in self.joints}
+        return tuple(name for name in names(self.model, _OBJECT.mjOBJ_ACTUATOR) if name not in own)
+
 
 def robot(path: Path) -> Robot:
     """Read a scene, MJCF or URDF. Raises ConfigError in one line."""

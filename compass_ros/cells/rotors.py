@@ -1,8 +1,12 @@
-"""A motor's side of a joint, as a joint of its own: what is elastic or has play is between the two.
+"""What lies between a joint and its motor or bearing, as joints of their own: its state is a part of qpos and qvel.
 
 MuJoCo moves a driven joint and its motor as one. A rotor is a body of the world with a joint of the same kind and with
 inertia alone, and a tendon whose length is the rotor's angle less the joint's. Nothing drives it, and the tendon does
-nothing, until a law says so; what moves otherwise is the same to the last bit. Its state is a part of qpos and qvel.
+nothing, until a law says so; what moves otherwise is the same to the last bit.
+
+Dry friction is a spring before it slides. What such a spring is anchored to, and slides under friction, is a body of
+the world with a joint of the same kind too; `native/fields.c` moves it. The spring's deflection is the joint's angle
+less the anchor's, and its largest at rest is the anchor's range (`jnt_range`): 0 is friction without a spring.
 """
 
 from __future__ import annotations
@@ -12,6 +16,8 @@ from collections.abc import Sequence
 import mujoco
 
 PREFIX = "rotor/"
+ANCHOR = "anchor/"
+_ONE_DOF = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 _DUST_KG, _DUST_KG_M2 = 1e-9, 1e-12
 """What a rotor that nothing drives weighs; MuJoCo has no body without mass."""
 
@@ -20,9 +26,7 @@ def add_rotors(spec: mujoco.MjSpec, joints: Sequence[str]) -> None:
     """Add a rotor to each of some hinges and slides, after all that there is."""
     for name in joints:
         joint = spec.joint(name)
-        body = spec.worldbody.add_body(name=f"{PREFIX}{name}")
-        body.mass, body.inertia, body.explicitinertial = _DUST_KG, [_DUST_KG_M2] * 3, True
-        rotor = body.add_joint(name=f"{PREFIX}{name}", type=joint.type, axis=[0, 0, 1])
+        rotor = _beside(spec, joint, PREFIX)
         rotor.actfrclimited, rotor.actfrcrange = joint.actfrclimited, joint.actfrcrange
         rotor.solref_friction, rotor.solimp_friction = joint.solref_friction, joint.solimp_friction
         tendon = spec.add_tendon(name=f"{PREFIX}{name}")
@@ -31,7 +35,30 @@ def add_rotors(spec: mujoco.MjSpec, joints: Sequence[str]) -> None:
         tendon.wrap_joint(name, -1.0)
 
 
+def add_anchors(spec: mujoco.MjSpec, joints: Sequence[str]) -> None:
+    """Add an anchor to those of some joints and bodies that are hinges or slides, after all that there is."""
+    for joint in map(spec.joint, joints):
+        if joint is not None and joint.type in _ONE_DOF:
+            _beside(spec, joint, ANCHOR)
+
+
+def _beside(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, prefix: str) -> mujoco.MjsJoint:
+    body = spec.worldbody.add_body(name=f"{prefix}{joint.name}")
+    body.mass, body.inertia, body.explicitinertial = _DUST_KG, [_DUST_KG_M2] * 3, True
+    added: mujoco.MjsJoint = body.add_joint(name=f"{prefix}{joint.name}", type=joint.type, axis=[0, 0, 1])
+    return added
+
+
 def rotors(model: mujoco.MjModel) -> list[tuple[int, int]]:
     """(joint, rotor) of each rotor in a model, as ids of joints."""
+    return _pairs(model, PREFIX)
+
+
+def anchors(model: mujoco.MjModel) -> list[tuple[int, int]]:
+    """(joint, anchor) of each anchor in a model, as ids of joints."""
+    return _pairs(model, ANCHOR)
+
+
+def _pairs(model: mujoco.MjModel, prefix: str) -> list[tuple[int, int]]:
     names = [model.joint(i).name for i in range(model.njnt)]
-    return [(names.index(name.removeprefix(PREFIX)), i) for i, name in enumerate(names) if name.startswith(PREFIX)]
+    return [(names.index(name.removeprefix(prefix)), i) for i, name in enumerate(names) if name.startswith(prefix)]

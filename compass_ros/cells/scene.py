@@ -12,7 +12,7 @@ import numpy as np
 
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.fields import names
-from compass_ros.cells.rotors import add_rotors
+from compass_ros.cells.rotors import add_anchors, add_rotors
 from compass_ros.cells.scene_source import scene_source
 from compass_ros.cells.sensors import add_sensors
 from compass_ros.cells.signals import Signal
@@ -32,7 +32,8 @@ def compiled(cell: Cell) -> tuple[mujoco.MjModel, Ints]:
     """
     nominal, _ = _model(str(cell.model_path), cell.hash)
     simple = _tuned_though_simple(nominal, cell.spec.parameters)
-    model, as_drawn = _model(str(cell.model_path), cell.hash, cell.signals, simple, str(cell.path), cell.rotors)
+    beside = cell.rotors, cell.anchors
+    model, as_drawn = _model(str(cell.model_path), cell.hash, cell.signals, simple, str(cell.path), beside)
     return copy.copy(model), as_drawn
 
 
@@ -43,12 +44,16 @@ def _model(
     signals: tuple[Signal, ...] = (),
     simple: tuple[str, ...] = (),
     where: str = "",
-    joints: tuple[str, ...] = (),
+    beside: tuple[tuple[str, ...], tuple[str, ...]] = ((), ()),
 ) -> tuple[mujoco.MjModel, Ints]:
-    """A scene's model, not to be changed; `content`: hash of its files; `joints`: get rotors. Raises ConfigError."""
+    """A scene's model, not to be changed; `content`: hash of its files; `beside`: joints that get rotors, anchors.
+
+    Raises ConfigError.
+    """
     try:
         spec = scene_source(Path(path)).spec
-        add_rotors(spec, joints)
+        add_rotors(spec, beside[0])
+        add_anchors(spec, beside[1])
         if signals:
             add_sensors(spec, _model(path, content)[0], signals, where)
         for name in simple:
@@ -57,7 +62,7 @@ def _model(
     except ValueError as error:
         raise ConfigError(f"{path}: {' '.join(str(error).split())}") from error
     if simple:
-        _same_numbers(model, _model(path, content, joints=joints)[0])
+        _same_numbers(model, _model(path, content, beside=beside)[0])
     as_drawn = [tendon.id for tendon in spec.tendons if tendon.springlength[0] < 0]
     return model, np.array(as_drawn, np.int64)
 

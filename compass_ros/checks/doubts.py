@@ -27,6 +27,7 @@ def doubts(cell: Cell, episodes: Sequence[Episode]) -> tuple[str, ...]:
     """One sentence each; empty when nothing is odd."""
     said = [_few(episodes), _alike(episodes)]
     said += [_unmoved(spec.name, episodes, cell.spec.noise_m) for spec in cell.objects]
+    said += [_unturned(spec.name, episodes) for spec in cell.objects if spec.quantity == "pose"]
     places = [spec.name for spec in cell.objects if spec.quantity in ("xy", "xyz", "pose")]
     said.append(_shaking(places, episodes))
     said += [missing_meshes(cell.model_path), *_remarks(episodes)]
@@ -71,6 +72,14 @@ def _unmoved(name: str, episodes: Sequence[Episode], expected: float) -> str:
     if not tracks or any(_moves(track, expected) for track in tracks):
         return ""
     return f"{name} never moves in {len(episodes)} episodes: nothing can be said about its parameters"
+
+
+def _unturned(name: str, episodes: Sequence[Episode]) -> str:
+    """What tracks positions alone often writes the identity."""
+    turns = [track.value[:, 3:] for episode in episodes for track in episode.tracks if track.object == name]
+    if not turns or np.ptp(np.concatenate(turns), axis=0).any():
+        return ""
+    return f"{name} has one and the same orientation in all messages: where none is measured, say `quantity: position`"
 
 
 def _shaking(names: Sequence[str], episodes: Sequence[Episode]) -> str:

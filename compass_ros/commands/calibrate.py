@@ -159,7 +159,7 @@ def run(
         nothing = "nothing was written: the parameters are, as soon as they are fitted"
         typer.echo(f"stopped; {there if written else nothing}", err=True)
         raise typer.Exit(130) from None
-    if style is ProgressStyle.bar:
+    if style is not ProgressStyle.json:
         print_result(result)
         for warning in (*left_out_lines(result.left_out), *result.warnings):
             typer.echo(f"note: {warning}", err=True)

@@ -94,9 +94,13 @@ def weigh(
             return fit_failed("what is left goes away with a shorter time step", finer)
     tell("weigh effects", 0.95)
     said = Judge(found, held_out, noise, alpha, threshold, odds, undetectable(first), warnings).discovery()
-    if said.mismatch.verdict != "none":
+    if said.mismatch.verdict == "none":
+        return replace(said, open_sigma=left_open(simulator, refined.fit, refined.among, held_out, seed))
+    if said.simulator is None:
         return said
-    return replace(said, open_sigma=left_open(simulator, refined, held_out, seed))
+    model = next(m for m in found.models if m.simulator is said.simulator)
+    unseen = model.likelihood.on(held_out)
+    return replace(said, open_sigma=left_open(model.simulator, model.fit, model.among, unseen, seed))
 
 
 def undetectable(first: list[Ranked]) -> tuple[str, ...]:

@@ -65,7 +65,7 @@ class Discovery:
     weighed: tuple[Weighed, ...] = ()
     """Explanations of known laws, and that nothing is missing, down to a hundredth of the probability."""
     open_sigma: float = 0.0
-    """What the parameters' error bars leave open in held-out episodes, over the noise."""
+    """What error bars, of parameters and of laws that are named, leave open in held-out episodes, over the noise."""
     instead: Cell | None = None
     """The cell with other numerics, with which a calibration has to be done anew before anything is said."""
     rivals: tuple[Hypothesis, ...] = ()

@@ -17,7 +17,6 @@ from compass_ros.calibration.cost import Point, cost
 from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise, correlation_of
-from compass_ros.calibration.refine import Refined
 from compass_ros.calibration.residuals import residual_at
 from compass_ros.discovery.nuisances import finite_step
 from compass_ros.simulation import Simulator
@@ -48,20 +47,21 @@ def shown_noise(noise: Noise, likelihood: Likelihood, fit: Fit) -> Noise:
     return replace(noise, with_outliers=np.maximum(noise.rms, np.sqrt(noise.sigma**2 + more)))
 
 
-def left_open(simulator: Simulator, refined: Refined, held_out: Likelihood, seed: int) -> float:
-    """How far [sigma, rms] predictions of held-out episodes may be off for the parameters' error bars and the time step
-    alone.
+def left_open(simulator: Simulator, fit: Fit, among: Floats, held_out: Likelihood, seed: int) -> float:
+    """How far [sigma, rms] predictions of held-out episodes may be off for the error bars of parameters and laws and
+    for the time step, alone. `among`: covariance of what is free in the fit, in squares of the standard deviations of
+    the prior.
 
     The largest over some draws of the parameters, and of what the step does in each episode where things touch
     (`nuisances`): a posterior predictive check (Gelman, Meng and Stern 1996), which a right model fails once in
     DRAWS + 1 times where collisions amplify everything.
     """
-    fit, rng = refined.fit, np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     seen = ~np.isnan(held_out.measured)
     if not len(fit.free) or not seen.any():
         return 0.0
     still = np.zeros_like(held_out.inputs)
-    moves = rng.multivariate_normal(np.zeros(len(fit.free)), refined.among, DRAWS, check_valid="ignore")
+    moves = rng.multivariate_normal(np.zeros(len(fit.free)), among, DRAWS, check_valid="ignore")
     points = [Point(fit.point.values, still, np.inf), *(_moved(held_out, fit, move) for move in moves)]
     _, residuals = cost(held_out, points, fit.robust)
     off = residuals[1:] - residuals[0]
@@ -79,12 +79,16 @@ def _moved(held_out: Likelihood, fit: Fit, move: Floats) -> Point:
 
 
 def honest(mismatch: Mismatch, error: float, floor: float, open_sigma: float = 0.0) -> Mismatch:
-    """The answer as it may be published beside these numbers: `none` never beside an error of TWICE the floor, and of
-    what is left open there (`left_open`)."""
-    if mismatch.verdict != "none" or error < TWICE * floor:
+    """The answer as it may be published beside these numbers: where an error of TWICE the floor is left, by the laws
+    too that are named, it says so; and it is not `none` there, but for what is left open (`left_open`)."""
+    if mismatch.verdict not in ("none", "named", "ambiguous") or error < TWICE * floor:
         return mismatch
+    times = f"{error / floor:.1f} times the noise"
     if error < TWICE * floor * np.hypot(1.0, open_sigma):
-        times = f"{error / floor:.1f} times the noise, which error bars of the parameters and the time step leave open"
-        return replace(mismatch, sentence=f"{mismatch.sentence} The held-out error is {times}.")
-    sentence = f"Something differs that no known law explains: held-out error {error / floor:.1f} times the noise."
+        said = f"The held-out error is {times}, which error bars of the parameters and the time step leave open."
+        return replace(mismatch, sentence=f"{mismatch.sentence} {said}")
+    if mismatch.verdict != "none":
+        said = f"More is missing: the held-out error is still {times}, and no law of the library explains what is left."
+        return replace(mismatch, sentence=f"{mismatch.sentence} {said}")
+    sentence = f"Something differs that no known law explains: held-out error {times}."
     return replace(mismatch, verdict="unknown", where=EVERYWHERE, sentence=sentence)

@@ -139,11 +139,17 @@ class Hypothesis:
         return std
 
     @property
+    def among(self) -> Floats:
+        """(n, n) covariance of what is free, by the noise, in squares of the prior's standard deviations."""
+        n = len(self.fit.free)
+        return covariance(self.likelihood, self.fit)[:n, :n]
+
+    @property
     def root(self) -> Floats:
         """(P + Q, n) a square root of the covariance of parameters and laws by the noise; none along the others."""
         free = self.fit.free
         root = np.zeros((len(self.fit.point.values), len(free)))
-        size, axes = np.linalg.eigh(covariance(self.likelihood, self.fit)[: len(free), : len(free)])
+        size, axes = np.linalg.eigh(self.among)
         root[free] = axes * np.sqrt(np.maximum(size, 0.0)) * self.likelihood.prior_std[free][:, None]
         return root
 

@@ -210,7 +210,7 @@ class Judge:
                 for m, p in list(zip(self.found.models, of_models, strict=True))[:SAID]
             ),
         ]
-        return tuple(sorted(rows, key=lambda e: -e.probability))
+        return tuple(sorted(rows, key=lambda e: (-e.probability, -e.log_evidence)))
 
     def _held_out(self, after: float) -> HeldOut:
         return HeldOut(self._before, after, self._floor, self.simulator.unit)

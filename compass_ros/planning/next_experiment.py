@@ -16,10 +16,9 @@ import numpy as np
 from compass_ros.discovery import Discovery
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.errors import DataError
-from compass_ros.planning.other_measurements import between, of_unknown
+from compass_ros.planning.other_measurements import Moved, between, how_moved, of_unknown
 from compass_ros.planning.trials import Trials, trials
 from compass_ros.simulation import Simulator
-from compass_ros.simulation.sites import any_slides
 from compass_ros.types import Floats
 
 DRAWS = 6
@@ -55,7 +54,7 @@ def with_next(found: Discovery, simulator: Simulator, seed: int) -> Discovery:
         except (DataError, np.linalg.LinAlgError) as error:
             following = NextExperiment(f"What to record next could not be worked out: {error}.")
     elif mismatch.verdict == "unknown" and mismatch.where is not None:
-        advice = of_unknown(mismatch.where.channel, any_slides(simulator.moving))
+        advice = of_unknown(mismatch.where.channel, how_moved(simulator))
         following = NextExperiment(f"To see what it depends on, {advice}.")
     if not following.sentence:
         return found
@@ -71,10 +70,10 @@ def next_experiment(simulator: Simulator, rivals: Sequence[Hypothesis], seed: in
     pairs = list(combinations(range(len(rivals)), 2))
     if not pairs:
         return NextExperiment("")
-    flat = any_slides(simulator.moving)
+    moved = how_moved(simulator)
     tried = trials(simulator, rivals[0].likelihood, seed, count)
     if tried is None:
-        return NextExperiment(_other(rivals, pairs, "recording of this kind", flat))
+        return NextExperiment(_other(rivals, pairs, "recording of this kind", moved))
     rng = np.random.default_rng(seed)
     predicted = [_predictions(rival, tried, rng) for rival in rivals]
     apart = np.array([_apart(predicted[a], predicted[b]) for a, b in pairs])  # (pairs, S)
@@ -82,14 +81,14 @@ def next_experiment(simulator: Simulator, rivals: Sequence[Hypothesis], seed: in
     least = np.min(np.where(apart > TOLD, apart, np.inf), axis=0)
     best = int(np.lexsort((np.where(told > 0, least, apart.max(axis=0)), told))[-1])
     if not told[best]:
-        return NextExperiment(_other(rivals, pairs, tried.word, flat))
+        return NextExperiment(_other(rivals, pairs, tried.word, moved))
     said = [
         f"{rivals[a].name} from {rivals[b].name} by {d:.0f} sigma"
         for (a, b), d in zip(pairs, apart[:, best], strict=True) if d > TOLD
     ]  # fmt: skip
     sentence = f"{tried.ask(best)}: it tells {', '.join(said)}."
     if left := [pair for pair, d in zip(pairs, apart[:, best], strict=True) if d <= TOLD]:
-        sentence += " " + _other(rivals, left, tried.word, flat)
+        sentence += " " + _other(rivals, left, tried.word, moved)
     return NextExperiment(sentence, tried.action(best), float(least[best]), tried.files(best))
 
 
@@ -113,9 +112,9 @@ def _apart(one: Floats, other: Floats) -> Floats:
     return np.asarray(np.sqrt(np.maximum(out, 0.0)))
 
 
-def _other(rivals: Sequence[Hypothesis], pairs: Sequence[tuple[int, int]], word: str, flat: bool) -> str:
+def _other(rivals: Sequence[Hypothesis], pairs: Sequence[tuple[int, int]], word: str, moved: Moved) -> str:
     names = [frozenset(a.effect.name for a in rival.laws) for rival in rivals]
     return " ".join(
-        f"No {word} tells {rivals[a].name} from {rivals[b].name}: {between(names[a], names[b], flat)}."
+        f"No {word} tells {rivals[a].name} from {rivals[b].name}: {between(names[a], names[b], moved)}."
         for a, b in pairs
     )

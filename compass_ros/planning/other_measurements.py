@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import Literal
 
+from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS
+from compass_ros.simulation.sites import any_slides
 
 _ENCODERS = "record the arm's own position too, by its encoders: a late command shows there, a late camera does not"
 _GRID = "put a puck at rest on nine known points of the table: the camera's errors show there, forces do not"
@@ -38,17 +41,32 @@ _OTHERS: Mapping[frozenset[str], str] = MappingProxyType(
         frozenset({"contact"}): "film one touch at several speeds with a fast camera",
     }
 )
+_SECOND = "measure the same motion with a second sensor, from another place: what it shows as well is motion"
+_FREE: Mapping[frozenset[str], str] = MappingProxyType(
+    {key: _SECOND if said == _ONE_CLOCK else said for key, said in _OTHERS.items()}
+)
+"""Where nothing is commanded."""
+Moved = Literal["flat", "driven", "free"]
+"""Whether something slides in a plane; else whether it is commanded."""
+_OF: Mapping[Moved, Mapping[frozenset[str], str]] = MappingProxyType({"flat": _TABLE, "driven": _OTHERS, "free": _FREE})
 
 
-def between(one: frozenset[str], other: frozenset[str], flat: bool) -> str:
-    """What to do where explanations with these names of laws are open; `flat`: something slides in a plane."""
+def how_moved(simulator: Simulator) -> Moved:
+    """How what is recorded comes to move."""
+    if any_slides(simulator.moving):
+        return "flat"
+    return "driven" if simulator.cell.action or simulator.cell.spec.inputs else "free"
+
+
+def between(one: frozenset[str], other: frozenset[str], moved: Moved) -> str:
+    """What to do where explanations with these names of laws are open."""
     names = one ^ other
     if not names:  # the same laws on other sites
-        return _ALONE if flat else _ONE_AT_A_TIME
+        return {"flat": _ALONE, "driven": _ONE_AT_A_TIME, "free": _OTHER_SPEED}[moved]
     channels = sorted({str(EFFECTS[name].channel) for name in names})
-    return (_TABLE if flat else _OTHERS)[frozenset(channels[-2:])]
+    return _OF[moved][frozenset(channels[-2:])]
 
 
-def of_unknown(channel: str, flat: bool) -> str:
+def of_unknown(channel: str, moved: Moved) -> str:
     """What to do where something is left that no law explains, in a channel or in `all`."""
-    return (_TABLE if flat else _OTHERS)[frozenset({"dynamics" if channel == "all" else channel})]
+    return _OF[moved][frozenset({"dynamics" if channel == "all" else channel})]

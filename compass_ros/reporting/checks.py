@@ -162,7 +162,7 @@ def _not_seen(result: Result) -> Iterator[Check]:
     hidden = [r.name for r in result.parameters if not (r.active or r.identifiable or r.name in grouped)]
     if hidden:
         text = f"{by_kind(hidden)}: hardly anything in these recordings depends on it. Its value says nothing."
-        yield Check("note", f"{len(hidden)} parameters not seen", text)
+        yield Check("note", f"{len(hidden)} parameter{'s' * (len(hidden) > 1)} not seen", text)
 
 
 def _at_bounds(result: Result) -> Iterator[Check]:
@@ -172,7 +172,11 @@ def _at_bounds(result: Result) -> Iterator[Check]:
         margin = BOUND_SHARE * (high - low)
         if told(row) and math.isfinite(margin) and not low + margin <= row.value <= high - margin:
             stuck.append(row)
-    if stuck:
+    absent = [row for row in stuck if abs(row.value) < BOUND_SHARE * (row.bounds[1] - row.bounds[0])]
+    if absent:
+        text = f"{_names(absent)}. These recordings do not call for any."
+        yield Check("note", f"{len(absent)} at zero", text)
+    if stuck := [row for row in stuck if row not in absent]:
         text = f"{_names(stuck)}. The true value may lie outside, or the parameter stands in for something else."
         yield Check("care", f"{len(stuck)} at a bound", text)
 

@@ -43,7 +43,7 @@ VERDICT_LEVEL: Mapping[Verdict, Level] = {
 
 VERDICT_MEANING: Mapping[Verdict, str] = {
     "none": "What is left after the calibration is no more than the noise of the recordings.",
-    "named": "A known effect explains what the calibrated simulator leaves over.",
+    "named": "A known effect explains what the calibrated simulator leaves over, or most of it.",
     "ambiguous": "An effect is there, but these recordings cannot tell its candidates apart.",
     "unknown": "Something is there, and none of the known effects explains it.",
     "fit_failed": "What is left is the simulator's numerics, or a fit of the search had no solution; nothing is named.",

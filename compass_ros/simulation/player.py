@@ -10,6 +10,7 @@ import mujoco
 from mujoco.rollout import Rollout
 
 from compass_ros.cells.derived import set_const
+from compass_ros.cells.rotors import anchors
 from compass_ros.simulation.native.program import Programs
 from compass_ros.simulation.physics import Physics
 from compass_ros.simulation.rotors import carry
@@ -80,9 +81,10 @@ class Player:
 
 
 def _copied(scene: mujoco.MjModel) -> mujoco.MjModel:
-    """A model to write into. One tree is one island: MuJoCo need not look for them, a fifth of an arm's step."""
+    """A model to write into. One tree is one island: MuJoCo need not look for them, a fifth of an arm's step. Anchors
+    are trees that no constraint touches."""
     model = copy.copy(scene)
-    if model.ntree == 1:
+    if model.ntree - len(anchors(model)) == 1:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
     return model
 

@@ -5,9 +5,13 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from compass_ros.cells.rotors import PREFIX, rotors
+from compass_ros.cells.rotors import PREFIX, anchors, rotors
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.sites import OF_JOINT, Site
+
+BEFORE_S = 0.1
+"""[s] How long a joint has moved before an episode or a window begins. Some milliradians bend a spring of dry friction
+to its end; a first speed that noise has put in the place of none must not."""
 
 
 def onto_rotor(model: mujoco.MjModel, joint: str, inertia: float, share: float) -> tuple[int, float]:
@@ -56,8 +60,13 @@ def carry(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Put the rotors where what is between them and their joints carries what the joints hold at rest, in place.
 
     A spring is twisted by what gravity, motion and other forces ask; play is at the flank that carries it, or, where
-    dry friction can hold the joint against a smaller load, between the two.
+    dry friction can hold the joint against a smaller load, between the two. The spring of a dry friction is bent as by
+    a motion of BEFORE_S at the joint's speed, so not at all at rest.
     """
+    for joint, anchor in anchors(model):
+        moved, most = BEFORE_S * data.qvel[model.jnt_dofadr[joint]], model.jnt_range[anchor, 1]
+        bent = most * np.sign(moved) * -np.expm1(-abs(moved) / most) if most > 0 else 0.0
+        data.qpos[model.jnt_qposadr[anchor]] = data.qpos[model.jnt_qposadr[joint]] - bent
     of = rotors(model)
     for joint, rotor in of:
         data.qpos[model.jnt_qposadr[rotor]] = data.qpos[model.jnt_qposadr[joint]]

@@ -48,8 +48,10 @@ def in_chunks(of: Callable[..., Floats], *rows: Floats) -> Floats:
 
 
 def with_rotors(cell: Cell, effects: Sequence[Attached]) -> Cell:
-    """The cell whose scene has the rotors that effects act on, and no others."""
-    return replace(cell, rotors=tuple(dict.fromkeys(n for a in effects if a.effect.rotor for n in a.objects)))
+    """The cell whose scene has the rotors and anchors that effects act on, and no others."""
+    rotors = dict.fromkeys(n for a in effects if a.effect.rotor for n in a.objects)
+    anchors = dict.fromkeys(n for a in effects if a.effect.anchor and a.on_joints for n in a.objects)
+    return replace(cell, rotors=tuple(rotors), anchors=tuple(anchors))
 
 
 class Simulator:
@@ -73,7 +75,7 @@ class Simulator:
         self._numerics(dynamics.model)
         drives = Drives(cell, dynamics.model)
         self.physics = Physics(cell, dynamics, places_of(cell, dynamics, drives), (), drives)
-        self._players: dict[tuple[str, ...], Player] = {(): Player(dynamics.model, threads)}
+        self._players: dict[tuple[tuple[str, ...], ...], Player] = {((), ()): Player(dynamics.model, threads)}
         self.physics = self._taking(effects)
 
     @property
@@ -86,7 +88,7 @@ class Simulator:
 
     @property
     def threads(self) -> int:
-        return self._players[()].threads
+        return self._players[(), ()].threads
 
     @property
     def rollouts(self) -> int:
@@ -112,7 +114,7 @@ class Simulator:
     def _taking(self, effects: Sequence[Attached]) -> Physics:
         """The physics with these effects, of the scene with the rotors that they act on."""
         physics, cell = replace(self.physics, effects=tuple(effects)), with_rotors(self.cell, effects)
-        if cell.rotors == self.cell.rotors:
+        if (cell.rotors, cell.anchors) == (self.cell.rotors, self.cell.anchors):
             return physics
         dynamics = dynamics_of(cell)
         self._numerics(dynamics.model)
@@ -120,13 +122,13 @@ class Simulator:
 
     @property
     def _player(self) -> Player:
-        """Of the scene with these rotors. That without any is kept, and the last one with some."""
-        rotors = self.cell.rotors
-        if rotors not in self._players:
-            plain = self._players[()]
+        """Of the scene with these rotors and anchors. That without any is kept, and the last one with some."""
+        beside = self.cell.rotors, self.cell.anchors
+        if beside not in self._players:
+            plain = self._players[(), ()]
             self._players.clear()
-            self._players.update({(): plain, rotors: Player(self.physics.model, plain.threads, like=plain)})
-        return self._players[rotors]
+            self._players.update({((), ()): plain, beside: Player(self.physics.model, plain.threads, like=plain)})
+        return self._players[beside]
 
     def driven(self, bank: Sequence[Drive]) -> Simulator:
         """The same with recorded inputs, of which the input `window` names one. Shares what `with_effects` shares."""
@@ -174,8 +176,11 @@ class Simulator:
 
     @property
     def unit(self) -> Unit:
-        """Of a distance between two states: rad where all that is tracked are hinges."""
-        return "rad" if {u for s, units in self.units.items() for u in units if s.places} == {"rad"} else "m"
+        """Of a distance between two states: rad where all that is fitted are hinges. Of a pose its place counts."""
+        found = {units[0] for s, units in self.units.items() if s.places and s.fitted}
+        if "rad" not in found:
+            return "m"
+        return "rad and mm" if "m" in found else "rad"
 
     @property
     def units(self) -> dict[Signal, tuple[str, ...]]:
@@ -268,7 +273,7 @@ class Simulator:
     def begun(self, values: Floats, inputs: Floats, duration: float) -> tuple[Floats, Floats | None, int]:
         """(B, s) states at the start, (B, T, n) what drives MuJoCo for `duration` seconds, and T."""
         start, steps = self.physics.start(values, inputs), self._steps(duration)
-        if self.cell.rotors:
+        if self.cell.rotors or self.cell.anchors:
             self._player.carry(self.physics, values, start)
         return start, self.physics.controls(values, inputs, steps), steps
 

@@ -7,15 +7,17 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from compass_ros.cells.robot import Robot, robot
 from compass_ros.cells.servo_scene import write_servo_scene
 from compass_ros.errors import ConfigError, nearest
 from compass_ros.starter.drives import moved, new_drives
 from compass_ros.starter.matching import Command, Found, Jointed, Placed, find
 from compass_ros.starter.measured import Sensor, command_errors, sensor
-from compass_ros.starter.names import Match
+from compass_ros.starter.names import Match, matched
 from compass_ros.starter.priors import guesses, input_name, of_link, pushed
-from compass_ros.starter.series import Recordings, read_all
+from compass_ros.starter.series import Recordings, Series, read_all
 from compass_ros.starter.text import comment, entry, listed, number, parameter, plain
 
 DRIVEN_S, PASSIVE_S = 5.0, 2.0
@@ -137,23 +139,38 @@ def _input(command: Command, used: Robot, name: str) -> Iterator[str]:
     yield from _names_said(one.joints)
     joints = [used.joint(m) for m in one.models]
     free = pushed(command, used)
+    coupled, untold = _beside(one, used, free)
+    yield from _names_said(coupled)
+    if untold:
+        yield from comment(f"nothing of the model is called {', '.join(untold)}: not used", 2)
+    given = [*_given(one), *coupled]
     pairs = [
         ("name", name),
         ("topic", plain(one.series.held.topic)),
         ("quantity", f"joint_{command.kind}"),
-        ("of", listed(_given(one))),
+        ("of", listed(given)),
         ("to", "qfrc" if free else "ctrl"),
     ]
-    targets = list(one.models) if free else [j.actuator for j in joints]
-    if targets != _given(one):
+    targets = list(one.models) if free else [*(j.actuator for j in joints), *(m.model for m in coupled.values())]
+    if targets != given:
         pairs.append(("at" if free else "actuators", listed(targets)))
     if command.kind == "effort" and not free and any(j.gain != 1 for j in joints):
-        pairs.append(("scale", "[" + ", ".join(number(1 / j.gain) for j in joints) + "]"))
+        scales = [*(1 / j.gain for j in joints), *(1.0 for _ in coupled)]
+        pairs.append(("scale", "[" + ", ".join(map(number, scales)) + "]"))
     if command.linear:
         pairs.append(("hold", "linear"))
     if one.series.held.part == "output":
         pairs.append(("part", "output"))
     yield entry(pairs)
+
+
+def _beside(one: Jointed, used: Robot, free: bool) -> tuple[dict[str, Match], list[str]]:
+    """What else a message tells: actuators that act on no single joint (on a tendon), and names that nothing has."""
+    if not one.series.held.named:
+        return {}, []
+    left = [name for name in one.series.names if name not in one.joints]
+    found = {} if free else matched(left, used.coupled)
+    return found, [name for name in left if name not in found]
 
 
 def _given(one: Jointed) -> list[str]:
@@ -208,11 +225,21 @@ def _placed(placed: Placed, free: bool) -> Iterator[str]:
     held = placed.series.held
     found = sensor([placed.series.columns(i) for i in range(min(3, placed.series.tracks[0].value.shape[1]))])
     yield from comment(f"{held.topic}: {found.rate_hz:.0f} Hz; {held.names[0]} is {placed.at} {placed.how}".rstrip(), 2)
-    pairs = [("name", plain(placed.at)), ("topic", plain(held.topic)), ("quantity", held.quantity)]
+    turned = held.quantity != "pose" or _turns(placed.series)
+    if not turned:
+        yield from comment("its orientation is one and the same in all messages: taken as not measured", 2)
+    pairs = [("name", plain(placed.at)), ("topic", plain(held.topic))]
+    pairs.append(("quantity", held.quantity if turned else "position"))
     if held.named and held.names[0] != placed.at:
         pairs += [("of", listed(held.names[:1])), ("at", listed([placed.at]))]
     pairs.append(("noise", number(found.noise)))
     yield entry(pairs if free else [*pairs, ("fitted", "false")])
+
+
+def _turns(series: Series) -> bool:
+    """Whether the orientation of a pose ever changes: what tracks positions alone often writes the identity."""
+    turns = np.concatenate([track.value[:, 3:] for track in series.tracks])
+    return bool(np.ptp(turns, axis=0).any())
 
 
 def _nothing(given: Robot, recordings: Recordings) -> str:

@@ -69,7 +69,7 @@ def _of(fitted: FittedEffect, places: Places, exported: Exported, changed: mujoc
     if law.rotor or (rotors(changed) and law.model is not None):
         return [], Said(law.name, on, "left out", "a motor's joint of its own, not tried in MJX")
     context = context_in(places, exported, fitted)
-    if law.model is not None:
+    if law.model is not None and law.forces is None:
         law.model(changed, np.array(fitted.values), context)
         return [], Said(law.name, on, "exact", "by `prepare`")
     terms = list(law.forces(np.array([fitted.values]), context)) if law.forces is not None else []

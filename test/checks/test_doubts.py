@@ -83,3 +83,15 @@ def test_copies(cell: Cell, sound: list[Episode]) -> None:
 def test_few(cell: Cell, sound: list[Episode]) -> None:
     assert doubts(cell, sound[:1])[0].startswith("one episode is few")
     assert doubts(cell, sound[:5])[0].startswith("5 episodes are few")
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_an_orientation_that_never_changes(turns: bool) -> None:
+    cell = load("ball_flight")
+    (spec,) = cell.objects
+    pose = np.zeros((60, 7))
+    pose[:, 0], pose[:, 3] = np.linspace(0, 1, 60), 1.0
+    pose[1:, 6] = 0.1 * turns
+    track = Track(spec.name, "pose", np.arange(60) * 10**7, pose)
+    said = doubts(cell, [Episode(str(i), cell.name, cell.hash, {}, 0, (track,)) for i in range(8)])
+    assert any("one and the same orientation" in sentence for sentence in said) is not turns

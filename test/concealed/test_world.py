@@ -107,7 +107,7 @@ def test_latency_of_the_camera_and_delay_of_the_arm_are_twins(rms_m: float) -> N
     assert effect["channels_right"] == ["actuation", "sensing"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_shots_start_where_the_arm_can_and_are_unlike() -> None:
     own = cell()
     shots = choose_shots(own, own.defaults, 12, np.random.default_rng(0))

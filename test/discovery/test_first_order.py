@@ -44,7 +44,7 @@ def plain(simulator: Simulator, likelihood: Likelihood) -> Hypothesis:
         ("quadratic_drag", [2e-4], 0.1),
         ("spring", [2e-3, 0.3, 0.0], 0.2),
         ("asymmetric_friction", [2e-4], 0.1),
-        ("stribeck_friction", [3e-4, 1.0], 0.4),
+        ("stribeck_friction", [3e-4, 1.0, 0.0], 0.4),
     ],
 )
 def test_a_small_law_of_force_is_found_with_its_numbers(

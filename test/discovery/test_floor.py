@@ -94,3 +94,7 @@ def test_what_the_error_bars_of_parameters_leave_open_is_no_error_of_the_model(
     said = honest(Mismatch("none", None, (), (), "", "Nothing is missing."), error, 1.0, open_sigma)
     assert said.verdict == verdict
     assert f"{error:.1f} times the noise" in said.sentence
+    beside = honest(Mismatch("named", None, (), (), "", "A spring is missing."), error, 1.0, open_sigma)
+    assert beside.verdict == "named"
+    assert ("More is missing" in beside.sentence) == (verdict == "unknown")
+    assert f"{error:.1f} times the noise" in beside.sentence

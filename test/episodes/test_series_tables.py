@@ -279,6 +279,7 @@ def test_mistakes_are_one_line(tmp_path: Path, case: str) -> None:
 
 
 @needs_real
+@pytest.mark.nightly
 def test_so101(tmp_path: Path) -> None:
     bags = import_tables(ROOT / "config/import/so101.yaml", tmp_path, REAL).bags
     cell = load("so101")

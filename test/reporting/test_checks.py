@@ -81,6 +81,9 @@ def test_a_value_at_its_bound_counts_only_where_it_is_active(clean: Result) -> N
     active, inactive = clean.parameters[0], next(row for row in clean.parameters if not row.active)
     stuck = replace(active, value=active.bounds[1])
     assert "1 at a bound" in titles(replace(clean, parameters=(stuck,)), "care")
+    absent = replace(active, value=0.0, bounds=(0.0, 1.0))
+    found = [c for c in assess(replace(clean, parameters=(absent,))) if c.title == "1 at zero"]
+    assert [c.level for c in found] == ["note"]
     idle = replace(inactive, value=inactive.bounds[0])
     assert titles(replace(clean, parameters=(idle,)), "care") == []
 

@@ -210,3 +210,34 @@ def test_recordings_of_another_configuration_are_read_by_the_cell_that_was_begun
         assert own.hashes == (own.hash, theirs.hash)
         assert {read(own, bag).cell_hash for bag in sorted(bags.iterdir())} == {theirs.hash}
         out.write_text(out.read_text() + "# edited\n")
+
+
+def test_a_command_of_an_actuator_on_a_tendon_is_given_on_and_one_of_nothing_is_said(tmp_path: Path) -> None:
+    grip = '<position name="grip" tendon="both" kp="1"/></actuator><tendon><fixed name="both">'
+    grip += '<joint joint="shoulder" coef="1"/><joint joint="elbow" coef="1"/></fixed></tendon>'
+    (tmp_path / "arm.xml").write_text(mjcf().replace("</actuator>", grip))
+    for seed in range(2):
+        time, target, got = moved(seed, SECONDS)
+        more = np.column_stack([target, np.zeros((len(time), 2))])
+        stamp = stamps(time, seed)
+        told = state("b", "/joint_commands", ["shoulder", "elbow", "grip", "lamp"], stamp, more)
+        record(tmp_path / "bags", seed, [state("a", "/joint_states", [*SAME], stamp, got), told])
+    start(tmp_path / "arm.xml", [tmp_path / "bags"], tmp_path / "cell.yaml")
+    target_of = load(tmp_path / "cell.yaml").spec.inputs[0]
+    assert target_of.of == target_of.targets == (*SAME, "grip")
+    assert "nothing of the model is called lamp: not used" in (tmp_path / "cell.yaml").read_text()
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_an_orientation_that_nobody_measured_is_none(tmp_path: Path, turned: bool) -> None:
+    (tmp_path / "arm.xml").write_text(mjcf())
+    for seed in range(2):
+        time = np.arange(0, 3.0, 0.02)
+        half = 0.5 * time * turned
+        pose = np.column_stack([0.3 * time, 0 * time, 1 - time**2, np.cos(half), 0 * time, 0 * time, np.sin(half)])
+        track = Track("red_cube", "pose", stamps(time, seed), pose)
+        record(tmp_path / "bags", seed, [(track, Source("/red_cube/pose", "red_cube", "pose"))])
+    start(tmp_path / "arm.xml", [tmp_path / "bags"], tmp_path / "cell.yaml")
+    cell = load(tmp_path / "cell.yaml")
+    assert cell.signal("red_cube").quantity == ("pose" if turned else "position")
+    assert ("taken as not measured" in (tmp_path / "cell.yaml").read_text()) is not turned

@@ -46,7 +46,7 @@ SMOOTH: tuple[tuple[str, tuple[str, ...], tuple[float, ...]], ...] = (
 )
 DRY: tuple[tuple[str, tuple[str, ...], tuple[float, ...]], ...] = (
     ("coulomb_friction", ("elbow",), (0.1,)),
-    ("stribeck_friction", ("shoulder",), (0.1, 0.3)),
+    ("stribeck_friction", ("shoulder",), (0.1, 0.3, 0.0)),
     ("asymmetric_friction", ("elbow",), (0.05,)),
     ("load_dependent_friction", ("shoulder",), (0.05,)),
 )

@@ -106,6 +106,8 @@ class Effect:
     """Whether it acts by the force that drives a joint, which its path does not say."""
     rotor: bool = False
     """Whether it acts between a joint and its motor, which the scene is then compiled with (`cells/rotors.py`)."""
+    anchor: bool = False
+    """Whether it is dry friction that may be a spring before it slides; the scene is compiled with its anchors too."""
     apart: bool = False
     """Whether it is another law on each of its sites, so that it is never the same one on several."""
     by_name: bool = False
@@ -184,6 +186,7 @@ RESTORED = (
     "geom_quat",
     "geom_sameframe",
     "geom_solref",
+    "jnt_range",
     "jnt_stiffness",
     "pair_solref",
     "sensor_objid",

@@ -12,6 +12,7 @@
 #include <mujoco/mujoco.h>
 
 enum { N_NUMBERS = 8, TABLE = 1 << 16 };
+#define DAMPING_RATIO 0.05   // of the spring in a dry friction, as of those in joints (effects/joint_elasticity.py)
 
 // Order and values are those of `Kind` in simulation/native/program.py.
 enum Kind {
@@ -173,7 +174,7 @@ static Force evaluate(const Term* term, const State* s) {
       return along(s, p[0] * s->weight * p[2], p[1]);
     case COULOMB:          // p: friction (JOINT: force), creep speed (JOINT: time constant, for `hold`), share of the weight
       return term->object == JOINT ? along(s, p[0], 0) : along(s, p[0] * s->weight * p[2], p[1]);
-    case STRIBECK:         // p: extra friction at rest, creep speed, share of the weight, Stribeck speed
+    case STRIBECK:         // p: extra friction at rest, creep speed, share of the weight, Stribeck speed (JOINT: anchor or -1)
       return along(s, more_friction(term, s->x, s->y, s->speed) * (term->object == JOINT ? 1.0 : s->weight * p[2]), p[1]);
     case PULSATING:        // p: cosine and sine amplitude, creep speed, share of the weight, frequency
       return along(s, (p[0] * cos(2 * M_PI * p[4] * s->time) + p[1] * sin(2 * M_PI * p[4] * s->time)) * s->weight * p[3],
@@ -419,6 +420,12 @@ static void solve_small(int n, double* a, double* x) {
   }
 }
 
+// Let an anchor, which nothing else moves, have a rate after the step.
+static void carry_anchor(const mjModel* m, mjData* d, int dof, double rate) {
+  double own = d->M[m->M_rowadr[dof] + m->M_rownnz[dof] - 1];
+  d->qfrc_passive[dof] += own * (rate - d->qvel[dof]) / m->opt.timestep + d->qfrc_bias[dof];
+}
+
 // Dry frictions of joints: the forces between their two limits with which these are at rest after the step. They come
 // after all other forces, for a joint is held against these. Those that each joint alone would not be held by are at a
 // limit at first; held ones beyond a limit go there, and are held again where they would be pushed back (block pivoting,
@@ -426,6 +433,9 @@ static void solve_small(int n, double* a, double* x) {
 // (documentation, "Computation"): a + v / tau + R F = 0 with R = (1 - d) / d of the joint's inverse inertia.
 // Where there is such a law all joints' frictionloss is solved for here and none is left for MuJoCo, which would move what
 // is held. That of a joint with a law is in its limits, and holds or creeps with it; that of others is as soft as it is.
+// With an anchor (cells/rotors.py) a friction is a spring before it slides, stepped by its own implicit formula: the force
+// is -k z - c z', linear in the rate after the step about the one before, and the anchor moves by what does not bend it.
+// Its range is how far the spring bends at rest, k its largest friction over that.
 // `most`: how many terms of a program are such frictions.
 static void hold(const mjModel* m, mjData* d, const Program* program, int most) {
   int nv = m->nv, n = 0, any = 0;
@@ -433,6 +443,9 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
   int dofs[most], held[most], solved[most], row[most];   // row: of MuJoCo's own constraint, where it is all there is
   double load[nv], total[nv], after[nv], unit[nv];
   double low[most], high[most], tau[most], give[most];   // of a soft friction: time constant [s], R
+  double drift[most];   // the acceleration that is asked for where no force is
+  int anchor[most];     // its degree of freedom, or -1
+  double rest[most], bent[most], rate[most];   // the largest friction at rest; range of a spring; rate of its anchor
   double force[most], limit[most], right[most], column[most * nv], matrix[most * most];
   fwd_actuation(m, d);   // MuJoCo computes these two after the passive forces
   rne(m, d, 0, d->qfrc_bias);
@@ -445,11 +458,14 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     if (!dry(term)) continue;
     int i = 0;
     while (i < n && dofs[i] != term->dof) i++;
-    if (i == n) dofs[n++] = term->dof, low[i] = high[i] = tau[i] = solved[i] = 0, row[i] = -1;
+    if (i == n) dofs[n++] = term->dof, low[i] = high[i] = tau[i] = solved[i] = rest[i] = 0, row[i] = anchor[i] = -1;
     if (term->kind == COULOMB) tau[i] = fmax(tau[i], term->number[1]);
     State s = joint_state(m, d, term);
     s.way = 1, low[i] += evaluate(term, &s).x;
     s.way = -1, high[i] += evaluate(term, &s).x;
+    s.speed = 0, rest[i] += evaluate(term, &s).x;
+    int of = term->kind == STRIBECK && term->number[0] ? (int)term->number[4] : -1;
+    if (of >= 0 && m->jnt_range[2 * of + 1] > 0) anchor[i] = m->jnt_dofadr[of], bent[i] = m->jnt_range[2 * of + 1];
     any |= low[i] || high[i];
   }
   if (!any) return;
@@ -457,10 +473,10 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     if (d->efc_type[r] != mjCNSTR_FRICTION_DOF) continue;
     int i = 0;
     while (i < n && dofs[i] != d->efc_id[r]) i++;
-    if (i == n) dofs[n++] = d->efc_id[r], low[i] = high[i] = solved[i] = 0;
+    if (i == n) dofs[n++] = d->efc_id[r], low[i] = high[i] = solved[i] = rest[i] = 0, anchor[i] = -1;
     double damping = d->efc_KBIP[4 * r + 1];   // of 0 no speed is pulled towards zero
     if (!low[i] && !high[i]) row[i] = r, tau[i] = damping > 0 ? 1 / damping : mjMAXVAL;
-    low[i] -= d->efc_frictionloss[r], high[i] += d->efc_frictionloss[r];
+    low[i] -= d->efc_frictionloss[r], high[i] += d->efc_frictionloss[r], rest[i] += d->efc_frictionloss[r];
     d->efc_frictionloss[r] = 0;
     if (d->nisland) d->iefc_frictionloss[d->map_efc2iefc[r]] = 0;   // where islands are solved, theirs is a copy
   }
@@ -470,8 +486,23 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     if (low[i] > high[i]) low[i] = high[i] = v > 0 ? low[i] : v < 0 ? high[i] : 0;   // less than none: along the motion
     give[i] = (row[i] < 0 ? (1 - hard) / hard * m->dof_invweight0[dof] : d->efc_R[row[i]]) * tau[i] / longer;
     tau[i] = longer;
+    drift[i] = v / tau[i];
+    if (anchor[i] >= 0) {
+      double step = m->opt.timestep, k = rest[i] / bent[i], most_bent = (high[i] - low[i]) / 2 / k;
+      double at = d->qpos[m->jnt_qposadr[m->dof_jntid[dof]]] - d->qpos[m->jnt_qposadr[m->dof_jntid[anchor[i]]]];
+      int rigid = k * step * step > d->M[own];   // stiffer than a step shows
+      double z = rigid ? 0 : within(at, -bent[i], bent[i]), end = rigid ? 0 : v < 0 ? -most_bent : most_bent;
+      double left = exp(-fabs(v) * step / most_bent), bending = (end - z) * (1 - left) / step;
+      rate[i] = v + (at - z) / step - bending;
+      if (!rigid) {
+        double firm = fmax(1e-6, (v < 0 ? z - end : end - z) / most_bent * left);
+        double stiff = k * step + 2 * DAMPING_RATIO * sqrt(k * d->M[own]);
+        tau[i] = step, give[i] = 1 / (step * firm * stiff), row[i] = -1;
+        drift[i] = (k * z + stiff * bending) * give[i];
+      }
+    }
     double own_give = d->M[own] * give[i], middle = (low[i] + high[i]) / 2;
-    double stop = (own_give * middle - d->M[own] * v / tau[i] - load[dof]) / (1 + own_give);
+    double stop = (own_give * middle - d->M[own] * drift[i] - load[dof]) / (1 + own_give);
     limit[i] = stop < low[i] ? low[i] : stop > high[i] ? high[i] : NAN;   // not a number: held
   }
   for (int round = 0, changed = 1; changed && round < 3 * n + 3; round++) {
@@ -484,7 +515,7 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     for (int r = 0; r < h; r++) {
       int i = held[r], dof = dofs[i];
       if (!solved[i]) unit[dof] = 1, solve_m(m, d, column + i * nv, unit, 1), unit[dof] = 0, solved[i] = 1;
-      right[r] = -d->qvel[dof] / tau[i] - after[dof] + give[i] * (low[i] + high[i]) / 2;
+      right[r] = -drift[i] - after[dof] + give[i] * (low[i] + high[i]) / 2;
     }
     for (int r = 0; r < h; r++)
       for (int c = 0; c < h; c++)
@@ -499,12 +530,15 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     }
     if (changed) continue;
     for (int i = 0; i < n; i++) {
-      double moving = d->qvel[dofs[i]] / tau[i] + after[dofs[i]], creeps = give[i] * (high[i] - low[i]) / 2;
+      double moving = drift[i] + after[dofs[i]], creeps = give[i] * (high[i] - low[i]) / 2;
       if (isnan(limit[i]) || low[i] == high[i]) continue;
       if (limit[i] == low[i] ? moving < creeps : moving > -creeps) limit[i] = NAN, changed = 1;
     }
   }
-  for (int i = 0; i < n; i++) d->qfrc_passive[dofs[i]] += fmax(low[i], fmin(high[i], force[i]));
+  for (int i = 0; i < n; i++) {
+    d->qfrc_passive[dofs[i]] += fmax(low[i], fmin(high[i], force[i]));
+    if (anchor[i] >= 0) carry_anchor(m, d, anchor[i], rate[i] + m->opt.timestep * after[dofs[i]]);
+  }
 }
 
 void compass_passive(const mjModel* m, mjData* d) {

@@ -12,6 +12,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from compass_ros.cells.rotors import ANCHOR
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.native.compiled import compiled_forces
 from compass_ros.simulation.site_kinds import DRIVES, JOINTS, PLANAR
@@ -105,6 +106,8 @@ class Programs:
             if term.site is not None:
                 row["object"], row["id"], row["dof"] = _place(models[0], term.site)
             row["number"][:, : term.numbers.shape[1]] = term.numbers
+            if term.kind == Kind.STRIBECK and term.site is not None and term.site.kind in JOINTS:
+                row["number"][:, 4] = mujoco.mj_name2id(models[0], mujoco.mjtObj.mjOBJ_JOINT, ANCHOR + term.site.name)
         self._programs = np.zeros(len(models), _PROGRAM)
         self._programs["n"] = len(terms)
         self._programs["term"] = self._block.ctypes.data + self._block.strides[0] * np.arange(len(models))

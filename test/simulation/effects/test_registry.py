@@ -29,6 +29,8 @@ NAMES = {
     "sensing": "camera_latency camera_scale camera_rotation lens_distortion rolling_shutter tracking_lag clock_drift "
     "latency scale offset rotation eccentricity",
 }
+TWICE = {"dead_band", "stribeck_friction"}
+"""Laws with two hooks: a dead band by the kind of drive; friction on a joint is a force, whose spring the scene has."""
 SHOTS = np.vstack([DESCRIBED, WIDE[:1]])
 
 
@@ -80,7 +82,7 @@ def test_an_unknown_effect_gets_the_nearest_name() -> None:
 def test_quantities_are_sane(name: str) -> None:
     kind = EFFECTS[name]
     hooks = (kind.forces, kind.model, kind.controls, kind.sensing)
-    assert sum(hook is not None for hook in hooks) == (2 if name == "dead_band" else 1)  # by the kind of drive
+    assert sum(hook is not None for hook in hooks) == (2 if name in TWICE else 1)
     assert any(q.amplitude for q in kind.quantities)
     for q in kind.quantities:
         assert q.unit in UNITS
