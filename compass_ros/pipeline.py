@@ -10,6 +10,7 @@ import numpy as np
 from compass_ros.assembly import assemble
 from compass_ros.calibration.noise import measure_noise
 from compass_ros.calibration.refine import Refined, refine
+from compass_ros.calibration.safeguard import moved_starts
 from compass_ros.cells import Cell
 from compass_ros.checks.check import check
 from compass_ros.config import CalibrationConfig
@@ -92,8 +93,7 @@ def _calibrate(
             begun = not_evaluated("the search has not ended")
             keep(noted(result(begun)), begun)
         found = searched(posed, estimate, refined, config, steady.share(first, 1.0))
-    if estimate.note:
-        told.append(estimate.note)
+    told.extend(filter(None, (estimate.note, moved_starts(refined) if refined is not None else "")))
     if len(used) < len(sound):
         said = f"{len(used)} of {len(sound)} episodes were used, evenly over the order of recording"
         told.append(f"{said}; the option `episodes` takes more")

@@ -12,7 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from compass_ros.calibration.cost import ROBUST, Point, start
+import numpy as np
+
+from compass_ros.calibration.cost import ROBUST, Point, launches_away, start
 from compass_ros.calibration.launches import with_launches
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import (
@@ -28,6 +30,8 @@ from compass_ros.types import Floats
 
 Distance = Callable[[Floats], float]
 """(P,) values -> how far they are from the recordings, as it is reported."""
+MOVED_FAR = 2.0
+"""Of first states, in standard deviations of what is stated of them (rms), from which that is said."""
 
 
 def no_farther(likelihood: Likelihood, refined: Refined, values: Floats, distance: Distance) -> Refined:
@@ -49,6 +53,19 @@ def farther(distance: Distance, reached: Floats, kept: Floats, begun: Floats) ->
     times = [distance(values) / distance(begun) for values in (reached, kept)]
     instead = f"one that begins with whole episodes is at {times[1]:.2f}" if times[1] < 1 else "the defaults stay"
     return f"a fit ended {times[0]:.2f} times as far from the fitted episodes (rms) as the defaults are; {instead}"
+
+
+def moved_starts(refined: Refined) -> str:
+    """What a user is told of first states that a fit had to move far from where they were measured; empty: it had not.
+
+    At MOVED_FAR three quarters of that, in mean square, is not the noise that is stated of them.
+    """
+    away = launches_away(refined.likelihood, refined.fit.point)
+    far = float(np.sqrt(np.mean(away**2))) if away.size else 0.0
+    if far < MOVED_FAR:
+        return ""
+    said = f"the fit moved the first states by {far:.1f} times the error that is stated of them (rms)"
+    return f"{said}: the scene, a number that is not tuned, or what they were measured with is wrong"
 
 
 def _stayed(likelihood: Likelihood, point: Point) -> Refined:

@@ -104,3 +104,15 @@ def test_a_launch_in_a_side_minimum_is_found_anew_and_the_others_stay(windowed: 
     assert found.cost < fit.point.cost
     again = minimise(given, found, NONE, 1, ROBUST).point
     assert found.cost == pytest.approx(again.cost, abs=1.0)
+
+
+@pytest.mark.parametrize("told", [RATES, 0.5 * RATES], ids=["right", "half"])
+def test_first_states_that_are_not_what_was_stated_are_said(told: Floats, tmp_path: Path) -> None:
+    of = cell(tmp_path, 0.05, {"position": 0.001, "velocity": 0.01})
+    given = [
+        replace(episode, initial_state={"axis": (0.3, float(rate))})
+        for episode, rate in zip(recorded(of), told, strict=True)
+    ]
+    result, _ = calibrate(given, of, CalibrationConfig(discover=False, threads=1))
+    said = [warning for warning in result.warnings if "the fit moved the first states by" in warning]
+    assert len(said) == (told is not RATES)
