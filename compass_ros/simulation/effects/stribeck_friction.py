@@ -5,9 +5,10 @@ Source: Stribeck curve in the form of Armstrong-Helouvry 1994, Gaussian exponent
 0.1 m/s there; with more than 0.3 m/s it is no friction of low speeds: a drag that falls at speed looks like that.
 On a joint it may be a spring before it slides, together with the joint's own dry friction Fc: F = -k z - c z', k =
 (Fc + extra) / presliding, c = 2 x 0.05 sqrt(k M), z' = v - |v| z / z(v), z(v) = (Fc + extra exp(-(v / speed)^2)) / k, M
-the joint's own inertia; presliding 0: it holds, as rigid as can be. Source: Dahl 1968 and LuGre friction as in Olsson's
-thesis of 1996, damped like the springs of joint_elasticity; presliding of gears is some milliradians
-(Armstrong-Helouvry, Dupont and Canudas de Wit 1994), and beyond 1 % of what a joint moves it is none any more.
+the joint's own inertia. Presliding 0: it holds, as rigid as can be; extra 0: the joint's own friction is a spring.
+Source: Dahl 1968 and LuGre friction as in Olsson's thesis of 1996, damped like the springs of joint_elasticity;
+presliding of gears is some milliradians (Armstrong-Helouvry, Dupont and Canudas de Wit 1994), and beyond 1 % of what a
+joint moves it is none any more.
 On a body in space the coefficient of each of its contacts with what stands is larger by extra exp(-(v / speed)^2), v
 the slip there; with `extra` below zero it grows with speed.
 """
@@ -53,7 +54,7 @@ def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
     return (
         Quantity("extra", size.force_unit, 0.0, LARGEST * size.force, MODEST * size.force),
         Quantity("speed", f"{size.length_unit}/s", 0.01 * v, v, 0.1 * v, amplitude=False, start=0.2 * v),
-        Quantity("presliding", size.length_unit, 0.0, most, 0.1 * most, False, 0.2 * most, later=True, grid=1),
+        Quantity("presliding", size.length_unit, 0.0, most, 0.1 * most, later=True),
     )
 
 

@@ -464,9 +464,9 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     s.way = 1, low[i] += evaluate(term, &s).x;
     s.way = -1, high[i] += evaluate(term, &s).x;
     s.speed = 0, rest[i] += evaluate(term, &s).x;
-    int of = term->kind == STRIBECK && term->number[0] ? (int)term->number[4] : -1;
+    int of = term->kind == STRIBECK ? (int)term->number[4] : -1;
     if (of >= 0 && m->jnt_range[2 * of + 1] > 0) anchor[i] = m->jnt_dofadr[of], bent[i] = m->jnt_range[2 * of + 1];
-    any |= low[i] || high[i];
+    any |= low[i] || high[i] || anchor[i] >= 0;
   }
   if (!any) return;
   for (int r = d->ne; r < d->ne + d->nf; r++) {
@@ -487,6 +487,7 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     give[i] = (row[i] < 0 ? (1 - hard) / hard * m->dof_invweight0[dof] : d->efc_R[row[i]]) * tau[i] / longer;
     tau[i] = longer;
     drift[i] = v / tau[i];
+    if (rest[i] <= 0) anchor[i] = -1;   // no friction to bend a spring
     if (anchor[i] >= 0) {
       double step = m->opt.timestep, k = rest[i] / bent[i], most_bent = (high[i] - low[i]) / 2 / k;
       double at = d->qpos[m->jnt_qposadr[m->dof_jntid[dof]]] - d->qpos[m->jnt_qposadr[m->dof_jntid[anchor[i]]]];

@@ -86,9 +86,15 @@ def test_a_shorter_spring_slides_more_and_more_like_none() -> None:
     assert off[0] > 3 * off[1] > 3 * off[2]
 
 
-def test_it_is_absent_where_the_friction_is_not_higher() -> None:
-    plain = Exported((), {})
-    np.testing.assert_array_equal(pushed(axis(1e-3), friction(0.0), 0.3, 1.0), pushed(axis(1e-3), plain, 0.3, 1.0))
+def test_it_is_absent_where_friction_is_neither_higher_nor_a_spring() -> None:
+    plain, none = Exported((), {}), friction(0.0, presliding=0.0)
+    np.testing.assert_array_equal(pushed(axis(1e-3), none, 0.3, 1.0), pushed(axis(1e-3), plain, 0.3, 1.0))
+
+
+def test_a_joint_s_own_friction_alone_is_a_spring_too() -> None:
+    """F = Fc (1 - exp(-angle / presliding)), Dahl's curve, but for how the joint swings on its spring."""
+    bent = pushed(axis(1e-3), friction(0.0), 0.5 * OWN, PERIOD_S / 4)[-1]
+    assert bent == pytest.approx(BENT * np.log(2), rel=0.2)
 
 
 def test_a_scene_without_the_anchor_is_refused_in_one_line() -> None:
