@@ -70,7 +70,7 @@ def npz_tables(path: Path, selection: Selection) -> Iterator[Table]:
     """The arrays whose name matches, one table each, columns numbered; or arrays side by side."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
-            if "=" in selection.pattern:
+            if "=" in selection.pattern or len(selection.pattern.split()) > 1:
                 yield from _side_by_side(path, arrays, selection.pattern)
                 return
             named = {key: arrays[key] for key in arrays.files if fnmatchcase(key, selection.pattern)}

@@ -86,6 +86,7 @@ def test_matlab_files_of_version_7_3_say_what_to_do(tmp_path: Path) -> None:
     ("arrays", "tables", "time", "column"),
     [
         ({"t": MS / 1000, "q": ANGLE}, "t=t q=q", "t", "q"),
+        ({"t": MS / 1000, "q": ANGLE}, "t q", "t", "q"),
         ({"t": MS / 1000, "Y": np.stack([ANGLE, MS])}, "t=t y=Y", "t", "y.0"),
         ({"Y": np.column_stack([MS / 1000, ANGLE])}, "*", "0", "1"),
         ({"Y": np.column_stack([MS / 1000, ANGLE]), "fs": np.array(100.0), "note": np.array("text")}, "*", "0", "1"),
