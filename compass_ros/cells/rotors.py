@@ -40,6 +40,7 @@ def add_anchors(spec: mujoco.MjSpec, joints: Sequence[str]) -> None:
     for joint in map(spec.joint, joints):
         if joint is not None and joint.type in _ONE_DOF:
             _beside(spec, joint, ANCHOR)
+            spec.body(f"{ANCHOR}{joint.name}").gravcomp = 1.0  # where nothing carries it, it stays where it is
 
 
 def _beside(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, prefix: str) -> mujoco.MjsJoint:

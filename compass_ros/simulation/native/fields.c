@@ -423,7 +423,7 @@ static void solve_small(int n, double* a, double* x) {
 // Let an anchor, which nothing else moves, have a rate after the step.
 static void carry_anchor(const mjModel* m, mjData* d, int dof, double rate) {
   double own = d->M[m->M_rowadr[dof] + m->M_rownnz[dof] - 1];
-  d->qfrc_passive[dof] += own * (rate - d->qvel[dof]) / m->opt.timestep + d->qfrc_bias[dof];
+  d->qfrc_passive[dof] += own * (rate - d->qvel[dof]) / m->opt.timestep;   // it has no weight
 }
 
 // Dry frictions of joints: the forces between their two limits with which these are at rest after the step. They come

@@ -18,11 +18,12 @@ DAMPING = 2 * 0.05 * np.sqrt((OWN + EXTRA) / BENT * INERTIA)
 PERIOD_S = 1.0
 
 
-def axis(step: float, anchored: bool = True) -> mujoco.MjModel:
+def axis(step: float, anchored: bool = True, kind: str = "hinge") -> mujoco.MjModel:
+    """A joint across gravity, of inertia (or mass) 0.05."""
     spec = mujoco.MjSpec.from_string(
-        f'<mujoco><option timestep="{step}" gravity="0 0 0"/><worldbody><body>'
-        f'<joint name="axis" type="hinge" axis="0 0 1" frictionloss="{OWN}"/>'
-        f'<inertial pos="0 0 0" mass="1" diaginertia="{INERTIA} {INERTIA} {INERTIA}"/>'
+        f'<mujoco><option timestep="{step}"/><worldbody><body>'
+        f'<joint name="axis" type="{kind}" axis="{"0 0 1" if kind == "hinge" else "1 0 0"}" frictionloss="{OWN}"/>'
+        f'<inertial pos="0 0 0" mass="{INERTIA}" diaginertia="{INERTIA} {INERTIA} {INERTIA}"/>'
         "</body></worldbody></mujoco>"
     )
     if anchored:
@@ -62,10 +63,11 @@ def bristled(most: float, times: Floats) -> Floats:
     return np.asarray(found.y[0])
 
 
+@pytest.mark.parametrize("kind", ["hinge", "slide"])
 @pytest.mark.parametrize("step", [1e-3, 2e-3])
 @pytest.mark.parametrize(("most", "within"), [(0.05, 0.01), (0.3, 0.01)], ids=["presliding", "sliding"])
-def test_it_moves_as_bristles_do(most: float, within: float, step: float) -> None:
-    got = pushed(axis(step), friction(), most, 2.0)
+def test_it_moves_as_bristles_do(most: float, within: float, step: float, kind: str) -> None:
+    got = pushed(axis(step, kind=kind), friction(), most, 2.0)
     expected = bristled(most, step * (1 + np.arange(len(got))))
     np.testing.assert_allclose(got, expected, atol=within * np.abs(expected).max())
 
@@ -101,6 +103,16 @@ def test_a_scene_without_the_anchor_is_refused_in_one_line() -> None:
     model = axis(1e-3, anchored=False)
     with pytest.raises(ConfigError, match="the scene has no anchor for joint 'axis'; simulate its cell"):
         attach(model, mujoco.MjData(model), friction())
+
+
+@pytest.mark.parametrize("kind", ["hinge", "slide"])
+def test_an_anchor_that_no_law_moves_stays(kind: str) -> None:
+    model = axis(1e-3, kind=kind)
+    data = mujoco.MjData(model)
+    data.qvel[0] = 1.0
+    mujoco.mj_step(model, data, nstep=1000)
+    assert data.qpos[0] > 0.1
+    assert data.qpos[1] == data.qvel[1] == 0.0
 
 
 def test_a_model_is_given_back_as_it_was() -> None:
