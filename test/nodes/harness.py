@@ -32,8 +32,8 @@ PATIENCE_S = 180.0
 """How long a test waits for what must come. A machine may be slow; where all is well, nobody waits."""
 
 SETTLE_S = 1.0
-"""How long a new client waits before it asks: a server drops its answer to one that it has not discovered in 0.1 s. With
-two cores taken by five other processes 0.3 s were too short once in some hundred calls."""
+"""How long a new client waits before it asks: a server drops its answer to one that it has not discovered in 0.1 s.
+With two cores taken by five other processes 0.3 s were too short once in some hundred calls."""
 
 
 def until(condition: Callable[[], bool], what: str, timeout_s: float = PATIENCE_S) -> None:
