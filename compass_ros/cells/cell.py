@@ -15,6 +15,9 @@ from compass_ros.cells.start import StartSpec, first_state, input_names, input_s
 from compass_ros.errors import ConfigError, nearest
 from compass_ros.types import ActionField, Bools, Episode, Floats, Parameter
 
+Beside = tuple[tuple[str, ...], tuple[str, ...]]
+"""Names of joints that get rotors, and of what gets anchors (`cells/rotors.py`)."""
+
 
 @dataclass(frozen=True)
 class Cell:
@@ -31,6 +34,11 @@ class Cell:
     """Of the simulation where it is not the scene's [s]."""
     holds: bool = False
     """Whether dry friction holds a joint that is at rest, where the scene's lets it creep."""
+
+    @property
+    def beside(self) -> Beside:
+        """What the compiled scene has beside the drawing."""
+        return self.rotors, self.anchors
 
     @property
     def name(self) -> str:

@@ -15,11 +15,19 @@ from collections.abc import Sequence
 
 import mujoco
 
+from compass_ros.cells.cell import Beside
+
 PREFIX = "rotor/"
 ANCHOR = "anchor/"
 _ONE_DOF = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 _DUST_KG, _DUST_KG_M2 = 1e-9, 1e-12
 """What a rotor that nothing drives weighs; MuJoCo has no body without mass."""
+
+
+def add_beside(spec: mujoco.MjSpec, beside: Beside) -> None:
+    """Add rotors, then anchors, after all that there is."""
+    add_rotors(spec, beside[0])
+    add_anchors(spec, beside[1])
 
 
 def add_rotors(spec: mujoco.MjSpec, joints: Sequence[str]) -> None:

@@ -10,9 +10,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from compass_ros.cells.cell import Cell
+from compass_ros.cells.cell import Beside, Cell
 from compass_ros.cells.fields import names
-from compass_ros.cells.rotors import add_anchors, add_rotors
+from compass_ros.cells.rotors import add_beside
 from compass_ros.cells.scene_source import scene_source
 from compass_ros.cells.sensors import add_sensors
 from compass_ros.cells.signals import Signal
@@ -32,8 +32,7 @@ def compiled(cell: Cell) -> tuple[mujoco.MjModel, Ints]:
     """
     nominal, _ = _model(str(cell.model_path), cell.hash)
     simple = _tuned_though_simple(nominal, cell.spec.parameters)
-    beside = cell.rotors, cell.anchors
-    model, as_drawn = _model(str(cell.model_path), cell.hash, cell.signals, simple, str(cell.path), beside)
+    model, as_drawn = _model(str(cell.model_path), cell.hash, cell.signals, simple, str(cell.path), cell.beside)
     return copy.copy(model), as_drawn
 
 
@@ -44,16 +43,15 @@ def _model(
     signals: tuple[Signal, ...] = (),
     simple: tuple[str, ...] = (),
     where: str = "",
-    beside: tuple[tuple[str, ...], tuple[str, ...]] = ((), ()),
+    beside: Beside = ((), ()),
 ) -> tuple[mujoco.MjModel, Ints]:
-    """A scene's model, not to be changed; `content`: hash of its files; `beside`: joints that get rotors, anchors.
+    """A scene's model, not to be changed; `content`: hash of its files; `beside`: as `add_beside` has it.
 
     Raises ConfigError.
     """
     try:
         spec = scene_source(Path(path)).spec
-        add_rotors(spec, beside[0])
-        add_anchors(spec, beside[1])
+        add_beside(spec, beside)
         if signals:
             add_sensors(spec, _model(path, content)[0], signals, where)
         for name in simple:

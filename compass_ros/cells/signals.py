@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from compass_ros.cells.series import OF_JOINTS, ControllerPart, SignalSpec, size_of
-from compass_ros.types import NUMBERS, Quantity
+from compass_ros.types import NUMBERS, Quantity, Track
 
 POSITIONS: frozenset[Quantity] = frozenset({"xy", "xyz", "position", "pose", "joint", "joint_position"})
 """Quantities that say where something is: a first state can come from them."""
@@ -66,3 +69,8 @@ def of_spec(spec: SignalSpec, first: int) -> Signal:
     at = spec.at or spec.of or (spec.name,)
     own = (spec.noise, spec.step, spec.fitted, spec.frame, spec.part)
     return Signal(spec.name, spec.quantity, spec.topic, spec.of, at, first, *own)
+
+
+def turned(tracks: Sequence[Track]) -> bool:
+    """Whether the orientations of poses ever differ: what tracks positions alone often writes the identity."""
+    return bool(np.ptp(np.concatenate([track.value[:, 3:] for track in tracks]), axis=0).any())

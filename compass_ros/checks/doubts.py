@@ -9,6 +9,7 @@ import numpy as np
 
 from compass_ros.cells import Cell
 from compass_ros.cells.scene_source import missing_meshes
+from compass_ros.cells.signals import turned
 from compass_ros.types import Episode, Floats, Track
 
 FEW = 8
@@ -75,9 +76,8 @@ def _unmoved(name: str, episodes: Sequence[Episode], expected: float) -> str:
 
 
 def _unturned(name: str, episodes: Sequence[Episode]) -> str:
-    """What tracks positions alone often writes the identity."""
-    turns = [track.value[:, 3:] for episode in episodes for track in episode.tracks if track.object == name]
-    if not turns or np.ptp(np.concatenate(turns), axis=0).any():
+    tracks = [track for episode in episodes for track in episode.tracks if track.object == name]
+    if not tracks or turned(tracks):
         return ""
     return f"{name} has one and the same orientation in all messages: where none is measured, say `quantity: position`"
 

@@ -17,14 +17,11 @@ from typing import Any
 import yaml
 from domain_coordinator import domain_id
 
-from compass_ros.demo.shared_memory import held_locks, remove, remove_half_made_ports
+from compass_ros.demo.shared_memory import kill, remove_half_made_ports, remove_ports
 from compass_ros.errors import CompassError, ConfigError
 
-PORTS_OF_DOMAIN = 250
 CHECK_S = 0.5
 """[s] How soon the end of a node is noticed."""
-FIRST_PORT = 7400
-"""Ports of domain d begin at FIRST_PORT + PORTS_OF_DOMAIN d (RTPS standard)."""
 
 
 class NodeError(CompassError):
@@ -74,11 +71,7 @@ class NodeProcess:
         try:
             self.process.wait(max(deadline - time.monotonic(), 0.01))
         except subprocess.TimeoutExpired:
-            locks = held_locks(self.process.pid)
-            os.killpg(self.process.pid, signal.SIGKILL)
-            self.process.wait()
-            for lock in locks:
-                remove(lock.name.removesuffix("_el"))
+            kill(self.process)
         if self.process.stdout is not None:
             self.process.stdout.close()
 
@@ -106,9 +99,7 @@ class NodeGroup:
         impatient = signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C must not cut this short
         try:
             self.stop(*self._nodes)
-            first = FIRST_PORT + PORTS_OF_DOMAIN * self._domain
-            for port in range(first, first + PORTS_OF_DOMAIN):
-                remove(f"fastrtps_port{port}")
+            remove_ports(self._domain)
         finally:
             signal.signal(signal.SIGINT, impatient)
             self._coordinator.__exit__(kind, error, trace)

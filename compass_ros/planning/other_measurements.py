@@ -33,22 +33,23 @@ _TABLE: Mapping[frozenset[str], str] = MappingProxyType(
 _ONE_CLOCK = "record the commands and the encoders with stamps of one clock, and a fast step of the command"
 _OTHER_SPEED = "repeat the motions at a third of their speed and at three times that, and from other places"
 _ONE_AT_A_TIME = "move one joint at a time, the others held"
-_OTHERS: Mapping[frozenset[str], str] = MappingProxyType(
+_SECOND = "measure the same motion with a second sensor, from another place: what it shows as well is motion"
+_ELSEWHERE: Mapping[frozenset[str], str] = MappingProxyType(
     {
-        **dict.fromkeys(_TABLE, _ONE_CLOCK),
         frozenset({"dynamics"}): _OTHER_SPEED,
         frozenset({"dynamics", "contact"}): "repeat the motions where nothing is touched",
         frozenset({"contact"}): "film one touch at several speeds with a fast camera",
     }
 )
-_SECOND = "measure the same motion with a second sensor, from another place: what it shows as well is motion"
-_FREE: Mapping[frozenset[str], str] = MappingProxyType(
-    {key: _SECOND if said == _ONE_CLOCK else said for key, said in _OTHERS.items()}
-)
-"""Where nothing is commanded."""
 Moved = Literal["flat", "driven", "free"]
 """Whether something slides in a plane; else whether it is commanded."""
-_OF: Mapping[Moved, Mapping[frozenset[str], str]] = MappingProxyType({"flat": _TABLE, "driven": _OTHERS, "free": _FREE})
+_OF: Mapping[Moved, Mapping[frozenset[str], str]] = MappingProxyType(
+    {
+        "flat": _TABLE,
+        "driven": {**dict.fromkeys(_TABLE, _ONE_CLOCK), **_ELSEWHERE},
+        "free": {**dict.fromkeys(_TABLE, _SECOND), **_ELSEWHERE},
+    }
+)
 
 
 def how_moved(simulator: Simulator) -> Moved:

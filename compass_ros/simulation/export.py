@@ -13,7 +13,7 @@ import numpy as np
 
 from compass_ros.cells import Cell
 from compass_ros.cells.registry import dynamics_of
-from compass_ros.cells.rotors import add_anchors, add_rotors
+from compass_ros.cells.rotors import add_beside
 from compass_ros.cells.scene_files import SceneFiles, scene_files
 from compass_ros.cells.scene_source import scene_source
 from compass_ros.simulation.effects import FittedEffect, write_effects
@@ -35,8 +35,7 @@ def write_scene(cell: Cell, values: Floats, path: Path) -> None:
     model (the speed that an arm reaches, a camera's bias) stays in result.json.
     """
     spec = scene_source(cell.model_path).spec
-    add_rotors(spec, cell.rotors)
-    add_anchors(spec, cell.anchors)
+    add_beside(spec, cell.beside)
     spec.option.timestep = cell.time_step or spec.option.timestep
     spec.compiler.saveinertial = True  # else MuJoCo computes masses from the drawing again
     spec.comment = spec.comment.replace("--", "- -")  # MuJoCo reads that, XML has no such comment

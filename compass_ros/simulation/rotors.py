@@ -8,10 +8,7 @@ import numpy as np
 from compass_ros.cells.rotors import PREFIX, anchors, rotors
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.sites import OF_JOINT, Site
-
-BEFORE_S = 0.1
-"""[s] How long a joint has moved before an episode or a window begins. Some milliradians bend a spring of dry friction
-to its end; a first speed that noise has put in the place of none must not."""
+from compass_ros.types import Floats
 
 
 def onto_rotor(model: mujoco.MjModel, joint: str, inertia: float, share: float) -> tuple[int, float]:
@@ -56,17 +53,19 @@ def _driving(model: mujoco.MjModel, joint: int) -> list[int]:
     return [i for i in range(model.nu) if model.actuator_trntype[i] in OF_JOINT and model.actuator_trnid[i, 0] == joint]
 
 
+def relax(model: mujoco.MjModel, positions: Floats) -> None:
+    """Put the anchors of (..., nq) positions where no spring of a dry friction is bent, in place: a motion of some
+    milliradians bends it."""
+    for joint, anchor in anchors(model):
+        positions[..., model.jnt_qposadr[anchor]] = positions[..., model.jnt_qposadr[joint]]
+
+
 def carry(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Put the rotors where what is between them and their joints carries what the joints hold at rest, in place.
 
     A spring is twisted by what gravity, motion and other forces ask; play is at the flank that carries it, or, where
-    dry friction can hold the joint against a smaller load, between the two. The spring of a dry friction is bent as by
-    a motion of BEFORE_S at the joint's speed, so not at all at rest.
+    dry friction can hold the joint against a smaller load, between the two.
     """
-    for joint, anchor in anchors(model):
-        moved, most = BEFORE_S * data.qvel[model.jnt_dofadr[joint]], model.jnt_range[anchor, 1]
-        bent = most * np.sign(moved) * -np.expm1(-abs(moved) / most) if most > 0 else 0.0
-        data.qpos[model.jnt_qposadr[anchor]] = data.qpos[model.jnt_qposadr[joint]] - bent
     of = rotors(model)
     for joint, rotor in of:
         data.qpos[model.jnt_qposadr[rotor]] = data.qpos[model.jnt_qposadr[joint]]

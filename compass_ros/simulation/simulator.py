@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from compass_ros.cells import Cell
+from compass_ros.cells.cell import Beside
 from compass_ros.cells.drives import Drive, Drives, span
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.cells.sensors import units_of
@@ -22,6 +23,7 @@ from compass_ros.simulation.native.program import evaluate, path_columns
 from compass_ros.simulation.numerics import set_numerics
 from compass_ros.simulation.physics import Physics, interpolate, places_of
 from compass_ros.simulation.player import Player
+from compass_ros.simulation.rotors import relax
 from compass_ros.simulation.sites import Places, Site
 from compass_ros.types import Floats, Ints, Parameter, Unit
 
@@ -75,7 +77,7 @@ class Simulator:
         self._numerics(dynamics.model)
         drives = Drives(cell, dynamics.model)
         self.physics = Physics(cell, dynamics, places_of(cell, dynamics, drives), (), drives)
-        self._players: dict[tuple[tuple[str, ...], ...], Player] = {((), ()): Player(dynamics.model, threads)}
+        self._players: dict[Beside, Player] = {((), ()): Player(dynamics.model, threads)}
         self.physics = self._taking(effects)
 
     @property
@@ -114,7 +116,7 @@ class Simulator:
     def _taking(self, effects: Sequence[Attached]) -> Physics:
         """The physics with these effects, of the scene with the rotors that they act on."""
         physics, cell = replace(self.physics, effects=tuple(effects)), with_rotors(self.cell, effects)
-        if (cell.rotors, cell.anchors) == (self.cell.rotors, self.cell.anchors):
+        if cell.beside == self.cell.beside:
             return physics
         dynamics = dynamics_of(cell)
         self._numerics(dynamics.model)
@@ -123,7 +125,7 @@ class Simulator:
     @property
     def _player(self) -> Player:
         """Of the scene with these rotors and anchors. That without any is kept, and the last one with some."""
-        beside = self.cell.rotors, self.cell.anchors
+        beside = self.cell.beside
         if beside not in self._players:
             plain = self._players[(), ()]
             self._players.clear()
@@ -273,7 +275,9 @@ class Simulator:
     def begun(self, values: Floats, inputs: Floats, duration: float) -> tuple[Floats, Floats | None, int]:
         """(B, s) states at the start, (B, T, n) what drives MuJoCo for `duration` seconds, and T."""
         start, steps = self.physics.start(values, inputs), self._steps(duration)
-        if self.cell.rotors or self.cell.anchors:
+        if self.cell.anchors:
+            relax(self.physics.model, start[:, 1 : 1 + self.physics.model.nq])
+        if self.cell.rotors:
             self._player.carry(self.physics, values, start)
         return start, self.physics.controls(values, inputs, steps), steps
 

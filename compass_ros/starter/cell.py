@@ -7,17 +7,16 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from compass_ros.cells.robot import Robot, robot
 from compass_ros.cells.servo_scene import write_servo_scene
+from compass_ros.cells.signals import turned
 from compass_ros.errors import ConfigError, nearest
 from compass_ros.starter.drives import moved, new_drives
 from compass_ros.starter.matching import Command, Found, Jointed, Placed, find
 from compass_ros.starter.measured import Sensor, command_errors, sensor
 from compass_ros.starter.names import Match, matched
 from compass_ros.starter.priors import guesses, input_name, of_link, pushed
-from compass_ros.starter.series import Recordings, Series, read_all
+from compass_ros.starter.series import Recordings, read_all
 from compass_ros.starter.text import comment, entry, listed, number, parameter, plain
 
 DRIVEN_S, PASSIVE_S = 5.0, 2.0
@@ -225,21 +224,15 @@ def _placed(placed: Placed, free: bool) -> Iterator[str]:
     held = placed.series.held
     found = sensor([placed.series.columns(i) for i in range(min(3, placed.series.tracks[0].value.shape[1]))])
     yield from comment(f"{held.topic}: {found.rate_hz:.0f} Hz; {held.names[0]} is {placed.at} {placed.how}".rstrip(), 2)
-    turned = held.quantity != "pose" or _turns(placed.series)
-    if not turned:
+    measured = held.quantity != "pose" or turned(placed.series.tracks)
+    if not measured:
         yield from comment("its orientation is one and the same in all messages: taken as not measured", 2)
     pairs = [("name", plain(placed.at)), ("topic", plain(held.topic))]
-    pairs.append(("quantity", held.quantity if turned else "position"))
+    pairs.append(("quantity", held.quantity if measured else "position"))
     if held.named and held.names[0] != placed.at:
         pairs += [("of", listed(held.names[:1])), ("at", listed([placed.at]))]
     pairs.append(("noise", number(found.noise)))
     yield entry(pairs if free else [*pairs, ("fitted", "false")])
-
-
-def _turns(series: Series) -> bool:
-    """Whether the orientation of a pose ever changes: what tracks positions alone often writes the identity."""
-    turns = np.concatenate([track.value[:, 3:] for track in series.tracks])
-    return bool(np.ptp(turns, axis=0).any())
 
 
 def _nothing(given: Robot, recordings: Recordings) -> str:

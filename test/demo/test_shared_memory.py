@@ -11,7 +11,7 @@ import pytest
 from domain_coordinator import domain_id
 
 from compass_ros.demo import processes
-from compass_ros.demo.shared_memory import SHARED_MEMORY, held_locks, remove, remove_half_made_ports
+from compass_ros.demo.shared_memory import SHARED_MEMORY, held_locks, remove_half_made_ports
 from test.nodes.harness import until
 
 PORT = SHARED_MEMORY / "fastrtps_port64999"
@@ -24,7 +24,7 @@ def half_made(request: pytest.FixtureRequest) -> Iterator[bytes]:
     """The port as a process leaves it that is killed at one of three moments."""
     PORT.write_bytes(request.param and request.param + bytes(4096 - 4))
     yield request.param
-    remove(PORT.name)
+    PORT.unlink(missing_ok=True)
 
 
 def test_a_port_that_nobody_makes_to_its_end_is_removed(half_made: bytes) -> None:
@@ -50,7 +50,7 @@ def test_a_port_stays_while_somebody_has_it_mapped(half_made: bytes) -> None:
 def test_a_port_that_can_be_used_stays() -> None:
     PORT.write_bytes((2).to_bytes(4, "little") + bytes(4092))
     assert PORT.name not in remove_half_made_ports()
-    remove(PORT.name)
+    PORT.unlink(missing_ok=True)
 
 
 @pytest.mark.ros

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import pytest
 from domain_coordinator import domain_id
 
-from compass_ros.demo.shared_memory import remove, remove_half_made_ports
+from compass_ros.demo.shared_memory import remove_half_made_ports, remove_ports
 from test.nodes.episodes import TOPIC
 from test.nodes.harness import NodeProcess, Probe
 
@@ -32,8 +32,7 @@ def domain() -> Iterator[int]:
         patch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", str(ROOT / "config" / "fastdds.xml"))
         remove_half_made_ports()
         yield number
-        for port in range(7400 + 250 * number, 7400 + 250 * (number + 1)):  # of this domain, by the standard of RTPS
-            remove(f"fastrtps_port{port}")
+        remove_ports(number)
 
 
 @pytest.fixture

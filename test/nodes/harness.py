@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -21,7 +20,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from rclpy.task import Future
 
-from compass_ros.demo.shared_memory import held_locks, remove
+from compass_ros.demo.shared_memory import kill
 
 Message = TypeVar("Message")
 
@@ -72,11 +71,7 @@ class NodeProcess:
     def kill(self) -> None:
         """End it at once, with all that it started in its group, and remove the shared memory that was its own."""
         if self.process.poll() is None:
-            locks = held_locks(self.process.pid)
-            os.killpg(self.process.pid, signal.SIGKILL)
-            self.process.wait(PATIENCE_S)
-            for lock in locks:
-                remove(lock.name.removesuffix("_el"))
+            kill(self.process, PATIENCE_S)
 
 
 class Probe:

@@ -14,7 +14,7 @@ from compass_ros.errors import ConfigError
 from compass_ros.simulation.effects.effect import Context, Effect, restore, table_friction
 from compass_ros.simulation.effects.exported import Exported, FittedEffect
 from compass_ros.simulation.native.program import Programs, Term
-from compass_ros.simulation.rotors import carry
+from compass_ros.simulation.rotors import carry, relax
 from compass_ros.simulation.sites import Places
 
 
@@ -55,6 +55,7 @@ def attach(model: mujoco.MjModel, data: mujoco.MjData, exported: Exported) -> At
         restore(model, before)
         raise
     set_const(model, copy.copy(data))
+    relax(model, data.qpos)
     carry(model, data)
     mujoco.mj_forward(model, data)
     return Attachment(model, before, programs)
