@@ -28,7 +28,7 @@ def doubts(cell: Cell, episodes: Sequence[Episode]) -> tuple[str, ...]:
     """One sentence each; empty when nothing is odd."""
     said = [_few(episodes), _alike(episodes)]
     said += [_unmoved(spec.name, episodes, cell.spec.noise_m) for spec in cell.objects]
-    said += [_unturned(spec.name, episodes) for spec in cell.objects if spec.quantity == "pose"]
+    said += [_unturned(signal.name, episodes) for signal in cell.signals if signal.quantity == "pose"]
     places = [spec.name for spec in cell.objects if spec.quantity in ("xy", "xyz", "pose")]
     said.append(_shaking(places, episodes))
     said += [missing_meshes(cell.model_path), *_remarks(episodes)]

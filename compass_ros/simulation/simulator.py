@@ -52,7 +52,7 @@ def in_chunks(of: Callable[..., Floats], *rows: Floats) -> Floats:
 def with_rotors(cell: Cell, effects: Sequence[Attached]) -> Cell:
     """The cell whose scene has the rotors and anchors that effects act on, and no others."""
     rotors = dict.fromkeys(n for a in effects if a.effect.rotor for n in a.objects)
-    anchors = dict.fromkeys(n for a in effects if a.effect.anchor and a.on_joints for n in a.objects)
+    anchors = dict.fromkeys(n for a in effects if a.effect.anchored for n in a.objects)
     return replace(cell, rotors=tuple(rotors), anchors=tuple(anchors))
 
 

@@ -78,7 +78,7 @@ def _of(fitted: FittedEffect, places: Places, exported: Exported, changed: mujoc
         return [], Said(law.name, on, "left out", (unsaid or [f"{outside}, outside of the model"])[0])
     if any(term.kind in _DRY and term.site is not None and term.site.kind in JOINTS for term in terms):
         creeps = "whole from the speed that it stops in a step; what it holds creeps"
-        springs = ", where it should be a spring" if law.anchor and any(fitted.values[2:]) else ""
+        springs = ", where it should be a spring" if law.spring and any(fitted.values[2:]) else ""
         return terms, Said(law.name, on, "alike", creeps + springs)
     return terms, Said(law.name, on, "exact")
 

@@ -34,7 +34,7 @@ def questions(result: Result) -> list[dict[str, Any]]:
     wrong, firm = sum(row.wrong for row in result.parameters), sum(row.identifiable for row in active)
     in_bars = in_error_bars(result)
     failed = VERDICT_LEVEL[result.mismatch.verdict] == "bad"
-    names = [effect.name for effect in result.mismatch.effects]
+    names = dict.fromkeys(effect.name for effect in result.mismatch.effects)
     return [
         {
             "question": "Which parameters?",

@@ -8,7 +8,7 @@ import numpy as np
 
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.effects.effect import Effect
-from compass_ros.simulation.site_kinds import JOINTS, in_words
+from compass_ros.simulation.site_kinds import in_words
 from compass_ros.simulation.sites import Places, Site
 from compass_ros.types import Bools, Floats, Parameter
 
@@ -35,11 +35,6 @@ class Attached:
         """The objects by site: one each, two of a pair; one empty site where it acts on all of a kind."""
         size = 2 if self.effect.paired else 1
         return tuple(self.objects[i : i + size] for i in range(0, len(self.objects), size)) or ((),)
-
-    @property
-    def on_joints(self) -> bool:
-        """Whether it may act on joints."""
-        return any(kind in JOINTS for kind in self.effect.on)
 
     @property
     def amplitudes(self) -> Bools:

@@ -106,8 +106,8 @@ class Effect:
     """Whether it acts by the force that drives a joint, which its path does not say."""
     rotor: bool = False
     """Whether it acts between a joint and its motor, which the scene is then compiled with (`cells/rotors.py`)."""
-    anchor: bool = False
-    """Whether it is dry friction that may be a spring before it slides; the scene is compiled with its anchors too."""
+    spring: str = ""
+    """The quantity that makes its dry friction a spring before it slides; a scene is compiled with anchors for it."""
     apart: bool = False
     """Whether it is another law on each of its sites, so that it is never the same one on several."""
     by_name: bool = False
@@ -123,6 +123,11 @@ class Effect:
     def moves(self) -> bool:
         """Whether it acts on bodies or joints by name."""
         return any(kind in MOVING for kind in self.on)
+
+    @property
+    def anchored(self) -> bool:
+        """Whether it needs anchors: a body that lies on something has no such quantity."""
+        return any(q.name == self.spring for q in self.quantities)
 
     @property
     def along_path(self) -> bool:

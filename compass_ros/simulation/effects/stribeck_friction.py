@@ -80,5 +80,5 @@ EFFECT = Effect(
     on_joint=_on_joint,
     on_body=_on_body,
     unable=slides_on_what_stands,
-    anchor=True,
+    spring="presliding",
 )
