@@ -12,6 +12,10 @@ from compass_ros.types import Bools, Floats, Ints
 
 FIRST_STEP = 0.02
 """First finite differences, in standard deviations of the prior."""
+LAUNCH_STEP, FARTHER = 0.1, 1.0
+"""Differences of launches, in their standard deviations: the first, and where that shows the simulator's roughness."""
+DOUBTFUL = 2 * 2**0.5
+"""Difference of two observations, in their roughness, up to which it may be nothing else: two standard deviations."""
 MARGIN_S = 0.1
 """How much earlier than at a point nearby a parameter may begin to act [s]."""
 
@@ -66,7 +70,7 @@ def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats, o
     for i, parameter in enumerate(free):
         values[1 + i, :, parameter] += steps[i]
     for i, column in enumerate(random):
-        inputs[1 + len(free) + i, :, column] += 0.1 * likelihood.launch_std[column]
+        inputs[1 + len(free) + i, :, column] += LAUNCH_STEP * likelihood.launch_std[column]
     index = np.tile(np.arange(episodes), columns)
     until = np.zeros((columns, episodes))
     if onset is not None:
@@ -78,8 +82,29 @@ def linearise(likelihood: Likelihood, point: Point, free: Ints, steps: Floats, o
     residual = flat.reshape(columns, episodes, *flat.shape[1:])
     scale = likelihood.prior_std[free] / steps
     jacobian = np.moveaxis((residual[1 : 1 + len(free)] - residual[0]) * scale[:, None, None, None], 0, -1)
-    launch = np.moveaxis((residual[1 + len(free) :] - residual[0]) * 10.0, 0, -1)
+    launch = np.moveaxis((residual[1 + len(free) :] - residual[0]) / LAUNCH_STEP, 0, -1)
+    launch = _seen(likelihood, point, residual[0], launch)
     return Linear(residual[0], jacobian, launch, same.reshape(columns, episodes)[1 : 1 + len(free)].T)
+
+
+def _seen(likelihood: Likelihood, point: Point, residual: Floats, launch: Floats) -> Floats:
+    """(E, F, C, l) differences of launches, those that may be the simulator's roughness alone taken over a whole
+    standard deviation.
+    """
+    if likelihood.rough is None or likelihood.smooth:
+        return launch
+    change = np.sqrt(np.mean((LAUNCH_STEP * launch) ** 2, axis=(1, 2)))  # (E, l)
+    rough = np.sqrt(np.mean((likelihood.rough / likelihood.sigma) ** 2, axis=(1, 2)))
+    episode, column = np.nonzero(change < DOUBTFUL * rough[:, None])
+    if not len(episode):
+        return launch
+    inputs = likelihood.inputs[episode] + point.launch[episode]
+    which = np.flatnonzero(likelihood.launch_std > 0)[column]
+    inputs[np.arange(len(which)), which] += FARTHER * likelihood.launch_std[which]
+    there = likelihood.residual(np.tile(point.values, (len(episode), 1)), inputs, episode)
+    launch = launch.copy()
+    launch[episode, :, :, column] = (there - residual[episode]) / FARTHER
+    return launch
 
 
 def extended(old: Linear, likelihood: Likelihood, point: Point, residual: Floats, free: Ints) -> Linear:

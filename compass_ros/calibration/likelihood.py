@@ -30,6 +30,9 @@ a simulator that has lost a body is never mistaken for one that agrees."""
 GROWING = (0.16, 0.28, 0.4, 0.55, 0.75, 1.0)
 """Shares of an episode that are fitted in turn: through several collisions it has many minima, its beginning has
 one."""
+SMOOTH = 0.14
+"""Roughness [sigma] below which differences of one length are as good as of another: it makes sigma a hundredth
+larger."""
 IN_WINDOWS = (0.28, 1.0)
 """The same of windows, which begin where they were measured: on a seven-joint arm with 64 wrong parameters the
 trajectory difference after the first share was that of the last (0.366 m, 0.026, then 0.0257 five times)."""
@@ -70,8 +73,9 @@ class Likelihood:
     difference: Difference = plain_difference
     windowed: bool = False
     """Whether these are windows of long recordings, each with a first state of its own."""
-    smooth: bool = False
-    """Whether the simulator is known to have no roughness here: differences of one length are as good as of another."""
+    rough: Floats | None = None
+    """(E, F, C) part of `sigma` that is the simulator's roughness [m or rad], as square root of variance; None: nobody
+    has asked (`roughness`)."""
     systematic: Floats | None = None
     """(C,) standard deviation of the part of `sigma` that depends on the place and not on the frame [m or rad]: what
     the sensor states beyond its scatter (`Noise.systematic`); None: it states nothing."""
@@ -90,6 +94,18 @@ class Likelihood:
         return self.high > self.low
 
     @property
+    def smooth(self) -> bool:
+        """Whether the simulator has no roughness here: differences of one length are as good as of another."""
+        return self.rough is not None and bool(np.max(self.rough / self.sigma) < SMOOTH)
+
+    @property
+    def roughness(self) -> float:
+        """Root mean square of the simulator's roughness over what was measured [sigma]; 0 where nobody has asked."""
+        if self.rough is None:
+            return 0.0
+        return float(np.sqrt(np.mean((self.rough / self.sigma)[~np.isnan(self.measured)] ** 2)))
+
+    @property
     def horizons(self) -> tuple[float, ...]:
         """Shares of an episode that are fitted in turn."""
         return IN_WINDOWS if self.windowed else GROWING
@@ -104,7 +120,9 @@ class Likelihood:
         frames = int(np.max(np.sum(self.time_s <= seconds, axis=1)))
         frames = max(frames, 2)
         measured = np.where(self.time_s[:, :frames, None] <= seconds, self.measured[:, :frames], np.nan)
-        return replace(self, time_s=self.time_s[:, :frames], measured=measured, sigma=self.sigma[:, :frames])
+        rough = None if self.rough is None else self.rough[:, :frames]
+        sigma = self.sigma[:, :frames]
+        return replace(self, time_s=self.time_s[:, :frames], measured=measured, sigma=sigma, rough=rough)
 
     def of(self, episodes: Ints) -> Likelihood:
         """The same for some of the episodes."""
@@ -114,12 +132,14 @@ class Likelihood:
             time_s=self.time_s[episodes],
             measured=self.measured[episodes],
             sigma=self.sigma[episodes],
+            rough=None if self.rough is None else self.rough[episodes],
         )
 
     def on(self, other: Likelihood) -> Likelihood:
         """The same model and prior for the recordings of another likelihood, which may lack the last inputs."""
         inputs = np.pad(other.inputs, ((0, 0), (0, self.inputs.shape[1] - other.inputs.shape[1])))
-        return replace(self, inputs=inputs, time_s=other.time_s, measured=other.measured, sigma=other.sigma)
+        of = other
+        return replace(self, inputs=inputs, time_s=of.time_s, measured=of.measured, sigma=of.sigma, rough=of.rough)
 
     def residual(self, values: Floats, inputs: Floats, episode: Ints) -> Floats:
         """(B, F, C) residuals in sigma for (B, P) values and (B, A) inputs; 0 where nothing was measured."""

@@ -17,15 +17,8 @@ import numpy as np
 from compass_ros.calibration.cost import ROBUST, Point, launches_away, start
 from compass_ros.calibration.launches import with_launches
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import (
-    Refined,
-    calmed,
-    concluded,
-    freed,
-    polish,
-    scaled,
-    with_roughness,
-)
+from compass_ros.calibration.refine import Refined, calmed, concluded, freed, polish, scaled
+from compass_ros.calibration.roughness import with_roughness
 from compass_ros.types import Floats
 
 Distance = Callable[[Floats], float]

@@ -21,7 +21,8 @@ bends, and asking it costs a quarter of them. On that arm one set of differences
 without; after three it is at 15,046.5."""
 FINE = (0.1, 0.03)
 """Lengths of these differences, in turn, as shares of those that move the residual by one sigma. The short ones are
-exact; the long ones see past what the simulator's steps at contacts do to a short one."""
+exact; the long ones see past what the simulator's steps at contacts do to a short one. None is shorter than its
+roughness."""
 SETTLED = 0.3
 """Fall of the cost [log likelihood] by a step, or by all steps with the same differences, that is the last one: models
 are compared by whole units."""
@@ -46,7 +47,7 @@ def settled(likelihood: Likelihood, fit: Fit) -> Fit:
     point = replace(fit.point, cost=float(cost(likelihood, [fit.point], robust)[0][0]))
     for taken in range(SETTLING):
         before = point.cost
-        length = FINE[-1] if likelihood.smooth else FINE[taken % len(FINE)]
+        length = FINE[-1] if likelihood.smooth else max(FINE[taken % len(FINE)], likelihood.roughness)
         take = linearise if likelihood.smooth else central
         linear = take(likelihood, point, free, length * difference_steps(linear), linear.onset)
         for _ in range(BENDS):

@@ -75,14 +75,17 @@ def simulated(response: Response, noise: Noise, rng: np.random.Generator) -> Flo
     """(E, F, C) residuals [sigma] of recordings of the plain model at its fit; 0 where nothing was measured.
 
     An encoder counts: its error is what the fitted motion makes of whole steps from a zero that nobody knows, and not
-    white. What else there is of noise has the recordings' own correlation.
+    white. What else there is of noise has the recordings' own correlation. The simulator's roughness is another path
+    from some contact on: one number for each episode and column, as large as it has grown by then.
     """
     likelihood, linear = response.likelihood, response.fit.linear
     shape = likelihood.measured.shape
     seen = ~np.isnan(likelihood.measured)
-    white = correlated(rng.standard_normal(shape), noise.correlation)
+    rough = np.zeros(shape) if likelihood.rough is None else likelihood.rough / likelihood.sigma
+    path = rough * rng.standard_normal((shape[0], 1, shape[2]))
+    white = np.sqrt(1 - rough**2) * correlated(rng.standard_normal(shape), noise.correlation)
     if noise.step is None:
-        return np.where(seen, white, 0.0)
+        return np.where(seen, white + path, 0.0)
     step = noise.step
     counts = step > 0
     fitted = np.where(seen, likelihood.measured + linear.residual * likelihood.sigma, 0.0)
@@ -91,4 +94,4 @@ def simulated(response: Response, noise: Noise, rng: np.random.Generator) -> Flo
     size = np.where(counts, step, 1.0)
     read = size * np.round((true + rest * white) / size)
     error = np.where(counts, true - read, white * likelihood.sigma)
-    return np.where(seen, error / likelihood.sigma, 0.0)
+    return np.where(seen, error / likelihood.sigma + path, 0.0)

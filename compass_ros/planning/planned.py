@@ -8,7 +8,8 @@ from compass_ros.calibration.cost import ROBUST, start
 from compass_ros.calibration.differences import linearise
 from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.refine import scaled, with_roughness
+from compass_ros.calibration.refine import scaled
+from compass_ros.calibration.roughness import with_roughness
 from compass_ros.cells import Cell
 from compass_ros.discovery.response import Response, respond
 from compass_ros.errors import ConfigError, DataError

@@ -1,0 +1,80 @@
+"""The simulator's own roughness, as a part of sigma.
+
+Contacts begin in one time step or in the next, a box lands on one corner or on another: what small changes of the
+parameters and of the first states do beyond a linear model is nothing that a fit could follow. It is noise, which the
+differences must be long enough to see past.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from compass_ros.calibration.cost import Point
+from compass_ros.calibration.differences import LAUNCH_STEP, difference_steps
+from compass_ros.calibration.least_squares import Fit
+from compass_ros.calibration.likelihood import Likelihood
+from compass_ros.types import Floats
+
+SMALL = 0.3
+"""Size of the changes that show roughness, in steps of the differences: curvature must not count."""
+DRAWS = 6
+"""Random changes that it is averaged over: a budget."""
+
+
+def with_rough_starts(likelihood: Likelihood, point: Point) -> Likelihood:
+    """Sigma with the roughness that small changes of the first states show, before anything was fitted.
+
+    By second differences, which of three values that are rough by themselves have six times the variance of one.
+    """
+    moves = _launch_moves(likelihood, np.random.default_rng(0))
+    if not moves.any():
+        return likelihood
+    values = np.tile(point.values, (DRAWS, 1))
+    there, here, back = (_residuals(likelihood, values, point.launch + side * moves) for side in (1, 0, -1))
+    return _grown(likelihood, (there - 2 * here + back) / np.sqrt(6))
+
+
+def with_roughness(likelihood: Likelihood, fit: Fit) -> Likelihood:
+    """Sigma with the simulator's roughness around a fit, in place of what was known of it.
+
+    Small random changes of the free parameters and first states must move the trajectories as the linear model says.
+    """
+    rng = np.random.default_rng(0)
+    free, steps = fit.free, difference_steps(fit.linear)
+    moves = SMALL * rng.choice([-1.0, 1.0], (DRAWS, len(free))) * steps / np.sqrt(len(free))
+    values = np.tile(fit.point.values, (DRAWS, 1))
+    values[:, free] += moves * likelihood.prior_std[free]
+    values = np.clip(values, likelihood.low, likelihood.high)
+    moves = (values - fit.point.values)[:, free] / likelihood.prior_std[free]
+    launches = _launch_moves(likelihood, rng)
+    random = likelihood.launch_std > 0
+    beyond = _residuals(likelihood, values, fit.point.launch + launches) - fit.linear.residual
+    beyond -= np.einsum("efcp,np->nefc", fit.linear.jacobian, moves)
+    shares = launches[..., random] / likelihood.launch_std[random]
+    return _grown(likelihood, beyond - np.einsum("efcl,nel->nefc", fit.linear.launch_jacobian, shares))
+
+
+def _launch_moves(likelihood: Likelihood, rng: np.random.Generator) -> Floats:
+    """(n, E, A) small changes of the first states."""
+    drawn = rng.standard_normal((DRAWS, *likelihood.inputs.shape))
+    return np.asarray(SMALL * LAUNCH_STEP * drawn * likelihood.launch_std)
+
+
+def _residuals(likelihood: Likelihood, values: Floats, launch: Floats) -> Floats:
+    """(n, E, F, C) with (n, P) values and (n, E, A) launches."""
+    episodes = len(likelihood.inputs)
+    inputs = (likelihood.inputs + np.broadcast_to(launch, (len(values), *likelihood.inputs.shape))).reshape(
+        -1, likelihood.inputs.shape[1]
+    )
+    flat = likelihood.residual(np.repeat(values, episodes, axis=0), inputs, np.tile(np.arange(episodes), len(values)))
+    return flat.reshape(len(values), episodes, *flat.shape[1:])
+
+
+def _grown(likelihood: Likelihood, beyond: Floats) -> Likelihood:
+    """The likelihood with the root mean square of (n, E, F, C) draws [sigma] as its roughness, which never heals."""
+    spread = np.sqrt(np.mean(beyond**2, axis=0)) * likelihood.sigma
+    rough = np.maximum.accumulate(spread, axis=1)
+    known = 0.0 if likelihood.rough is None else likelihood.rough
+    return replace(likelihood, sigma=np.sqrt(likelihood.sigma**2 - known**2 + rough**2), rough=rough)
