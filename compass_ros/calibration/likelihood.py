@@ -101,9 +101,10 @@ class Likelihood:
     @property
     def roughness(self) -> float:
         """Root mean square of the simulator's roughness over what was measured [sigma]; 0 where nobody has asked."""
-        if self.rough is None:
+        seen = ~np.isnan(self.measured)
+        if self.rough is None or not seen.any():
             return 0.0
-        return float(np.sqrt(np.mean((self.rough / self.sigma)[~np.isnan(self.measured)] ** 2)))
+        return float(np.sqrt(np.mean((self.rough / self.sigma)[seen] ** 2)))
 
     @property
     def horizons(self) -> tuple[float, ...]:
