@@ -122,7 +122,7 @@ class Hypothesis:
     @property
     def log_evidence(self) -> float:
         """With a discrepancy in proportion to its laws; without laws, with none."""
-        chance = sum(law.effect.scattered for law in self.laws)
+        chance = sum(law.drawn for law in self.laws)
         return self._with_law[0] - chance * float(np.log(len(SPREADS))) if self.laws else self.free.alone
 
     @cached_property
@@ -188,7 +188,7 @@ def widened(simulator: Simulator, likelihood: Likelihood, added: Sequence[Attach
     quantities = [q for a in added for q in a.effect.quantities]
     mean = [q.begins if q.amplitude else q.start for q in quantities]
     std = [WIDTH * q.scale if q.amplitude else (q.high - q.low) / 4 for q in quantities]
-    more = sum(a.effect.scattered for a in added)
+    more = sum(a.drawn for a in added)
     return wider, replace(
         played(likelihood, wider),
         inputs=np.pad(likelihood.inputs, ((0, 0), (0, more))),

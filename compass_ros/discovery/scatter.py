@@ -1,6 +1,6 @@
-"""Laws that differ from one episode to the next by chance: a deviation of each, and how far they spread.
+"""Laws that differ from one episode to the next by chance: deviations of each, and how far they spread.
 
-The deviations are numbers of an episode as its launch is: around zero with a common standard deviation, which is found
+The deviations are numbers of an episode as its launch is: around zero with a standard deviation each, which is found
 by expectation and maximisation (Dempster, Laird and Rubin 1977) and costs evidence for having been free.
 """
 
@@ -28,57 +28,61 @@ LEAST = 0.01
 
 
 def ranked_scatter(response: Response, candidate: Candidate) -> Ranked:
-    """A law of chance at the spread that has the highest evidence, to first order."""
-    (quantity,) = candidate.attached.effect.quantities
-    columns = _deviations(response, candidate, quantity.scale)
+    """A law of chance at the spread that has the highest evidence, to first order: the same for all its numbers, in
+    their modest sizes."""
+    modest = np.array([q.scale for q in candidate.attached.effect.quantities])
+    columns = _deviations(response, candidate, modest)
     tangent = response.tangent
-    none = np.zeros((len(columns), 1))
-    sizes = quantity.scale * np.array(SPREADS)
+    none = np.zeros((len(columns), len(modest)))
     logs = [
         evidences(
             replace(
                 tangent,
-                own=np.concatenate([tangent.own, size * columns], axis=2),
+                own=np.concatenate([tangent.own, spread * columns], axis=2),
                 own_away=np.concatenate([tangent.own_away, none], axis=1),
             ),
             [None],
         )[0].log
-        for size in sizes
+        for spread in SPREADS
     ]
     gain = log_sum(np.array(logs)) - float(np.log(len(logs))) - evidences(tangent, [None])[0].log
-    seen = quantity.high * float(np.linalg.norm(columns)) > SIGMAS
-    return Ranked(candidate, sizes[[int(np.argmax(logs))]], columns[:, :, :0], gain, seen)
+    largest = max(q.high / q.scale for q in candidate.attached.effect.quantities)
+    seen = largest * float(np.linalg.norm(columns)) > SIGMAS
+    return Ranked(candidate, SPREADS[int(np.argmax(logs))] * modest, columns[:, :, :0], gain, seen)
 
 
-def _deviations(response: Response, candidate: Candidate, step: float) -> Floats:
-    """(E, D, 1) change of the residual per deviation of an episode."""
-    point, likelihood = response.fit.point, response.likelihood
+def _deviations(response: Response, candidate: Candidate, modest: Floats) -> Floats:
+    """(E, D, q) change of the residual by a modest deviation of an episode in each of the (q,) numbers."""
+    likelihood, point = response.likelihood, response.fit.point
     with_it = response.simulator.with_effects([*response.simulator.effects, candidate.attached])
-    inputs = np.pad(likelihood.inputs + point.launch, ((0, 0), (0, 1)), constant_values=step)
-    values = np.tile(np.append(point.values, step), (len(inputs), 1))
-    predicted = with_it.observe(values, inputs, likelihood.time_s)
-    there = np.nan_to_num(likelihood.difference(predicted, likelihood.measured) / likelihood.sigma)
-    change = there.reshape(response.tangent.residual.shape) - response.tangent.residual
-    return np.asarray(change[:, :, None] / step)
+    values = np.tile(np.append(point.values, modest), (len(likelihood.inputs), 1))
+    changes = []
+    for one in np.diag(modest):
+        inputs = np.concatenate([likelihood.inputs + point.launch, np.tile(one, (len(values), 1))], axis=1)
+        predicted = with_it.observe(values, inputs, likelihood.time_s)
+        there = np.nan_to_num(likelihood.difference(predicted, likelihood.measured) / likelihood.sigma)
+        changes.append(there.reshape(response.tangent.residual.shape) - response.tangent.residual)
+    return np.stack(changes, axis=2)
 
 
 def with_scatter(parent: Hypothesis, ranked: Ranked) -> Hypothesis:
-    """The parent's model fitted with a deviation of each episode beside."""
+    """The parent's model fitted with deviations of each episode beside."""
     attached = ranked.candidate.attached
     simulator, likelihood = widened(parent.simulator, parent.likelihood, [attached])
-    spread, base = float(ranked.numbers[0]), parent.fit.point
-    point = Point(np.append(base.values, spread), np.pad(base.launch, ((0, 0), (0, 1))), np.inf)
+    spread, base = ranked.numbers, parent.fit.point
+    point = Point(np.append(base.values, spread), np.pad(base.launch, ((0, 0), (0, len(spread)))), np.inf)
     for _ in range(TURNS):
         likelihood, point = _spread(likelihood, point, spread)
         fit = minimise(likelihood, point, parent.fit.free, ITERATIONS, parent.fit.robust, 1.0)
-        point, spread = fit.point, float(spreads(likelihood, fit)[-1])
+        point, spread = fit.point, spreads(likelihood, fit)[-len(spread) :]
     return Hypothesis((*parent.laws, attached), simulator, likelihood, fit, without=parent.bare)
 
 
-def _spread(likelihood: Likelihood, point: Point, spread: float) -> tuple[Likelihood, Point]:
-    """The same with deviations that spread so far."""
-    quantity = likelihood.parameters[-1]
-    spread = float(np.clip(spread, LEAST * quantity.half_width, quantity.high))
+def _spread(likelihood: Likelihood, point: Point, spread: Floats) -> tuple[Likelihood, Point]:
+    """The same with (q,) deviations that spread so far."""
+    last = slice(-len(spread), None)
+    quantities = likelihood.parameters[last]
+    spread = np.clip(spread, [LEAST * q.half_width for q in quantities], [q.high for q in quantities])
     mean, std, values = likelihood.prior_mean.copy(), likelihood.launch_std.copy(), point.values.copy()
-    mean[-1] = std[-1] = values[-1] = spread
+    mean[last] = std[last] = values[last] = spread
     return replace(likelihood, prior_mean=mean, launch_std=std), replace(point, values=values)

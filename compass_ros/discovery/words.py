@@ -103,7 +103,8 @@ def value_of(finding: EffectFinding, attached: Attached, told: bool) -> str:
     """The effect and its amplitudes: 'fan_field, strength 0.21 +- 0.01 m/s^2'; `told`: with what it acts on.
 
     Those that are not told from zero stand last. A law that is clearly there and of which that holds for all is known
-    together with its shape, or with numbers of the scene.
+    together with its shape, or with numbers of the scene. Of numbers that each episode has by chance: how far they
+    spread.
     """
     sure, open_ = list[str](), list[str]()
     for quantity in attached.effect.quantities:
@@ -113,10 +114,11 @@ def value_of(finding: EffectFinding, attached: Attached, told: bool) -> str:
             to = sure if abs(found.value) >= ERROR_BARS * found.std else open_
             to.append(f"{quantity.name} {found.value:.3g} +- {found.std:.1g}{unit}")
     on = f" of {', '.join(attached.objects)}" if told else ""
+    of_chance = " (standard deviations over episodes, each of which has its own)" * attached.effect.scattered
     if not sure:
         return f"{finding.name}{on}, {', '.join(open_)} (shows only together with other numbers)"
     rest = f" (not told from 0: {', '.join(open_)})" if open_ else ""
-    return f"{finding.name}{on}, {', '.join(sure)}{rest}"
+    return f"{finding.name}{on}, {', '.join(sure)}{rest}{of_chance}"
 
 
 def corrected(laws: Sequence[Attached]) -> str:

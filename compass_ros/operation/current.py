@@ -93,7 +93,7 @@ def current(cell: Cell, version: Path | None = None, threads: int = 0) -> Curren
         return Current(Simulator(cell, threads=threads), values)
     fitted = read_effects(version / "effects.yaml").effects
     simulator = Simulator(cell, [one.attached for one in fitted], threads)
-    expected = [np.zeros(1) if one.attached.effect.scattered else np.array(one.values) for one in fitted]
+    expected = [one.attached.expected(one.values) for one in fitted]
     return Current(simulator, np.concatenate([values, *expected]))
 
 

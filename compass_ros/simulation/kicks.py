@@ -34,7 +34,7 @@ class Kicks:
 def kicks(simulator: Simulator, values: Floats, inputs: Floats, time_s: Floats, count: int) -> Kicks:
     """For (P,) values, (E, A) inputs and (E, F) times [s], at so many moments, in the middle of equal stretches."""
     episodes = len(inputs)
-    tiled = np.tile(values, (episodes, 1))
+    tiled = simulator.physics.own(np.tile(values, (episodes, 1)), inputs)
     start, controls, steps = simulator.begun(tiled, inputs, simulator.physics.duration(tiled, inputs, time_s))
     states, sensors = simulator.play(tiled, start, controls, steps)
     states = np.concatenate([start[:, None], states], axis=1)
@@ -45,7 +45,7 @@ def kicks(simulator: Simulator, values: Floats, inputs: Floats, time_s: Floats, 
     raw = _Raw(simulator, states.shape[2] - 1)
     base = raw.rows(states[:, :-1], states[:, 1:], sensors)
     stretches = [
-        _stretch(simulator, chart, raw, values, controls, (states, base), sizes, slice(first, last))
+        _stretch(simulator, chart, raw, tiled, controls, (states, base), sizes, slice(first, last))
         for first, last in pairwise(moments)
     ]
     response = []
@@ -105,7 +105,7 @@ def _stretch(
     for i in range(0, len(flat), CHUNK):
         part = slice(i, i + CHUNK)
         driven = None if controls is None else np.ascontiguousarray(controls[of[part], stretch])
-        after, sensors = simulator.play(np.tile(values, (len(flat[part]), 1)), flat[part], driven, length)
+        after, sensors = simulator.play(values[of[part]], flat[part], driven, length)
         before = np.concatenate([flat[part][:, None], after[:, :-1]], axis=1)
         rows.append(raw.rows(before, after, sensors) - base[of[part], stretch])
         ends.append(chart.apart(states[of[part], stretch.stop], after[:, -1]))

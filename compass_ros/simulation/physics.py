@@ -31,7 +31,7 @@ Acting = tuple[Attached, Floats, tuple[Site, ...]]
 class Physics:
     """A cell with effects, asked for B rollouts at once: (B, P) values, (B, A) inputs.
 
-    The inputs may go on with one column for each scattered effect: the rollout's own number, instead of the value.
+    The inputs may go on with the rollout's own numbers of each scattered effect, which `own` puts in place of values.
     Raises ConfigError where an effect acts on what the scene lacks.
     """
 
@@ -74,6 +74,19 @@ class Physics:
         for attached in self.effects:
             size = len(attached.effect.quantities)
             out.append((attached, values[:, at : at + size]))
+            at += size
+        return out
+
+    def own(self, values: Floats, inputs: Floats) -> Floats:
+        """(B, P) values with each rollout's own numbers of what differs by chance, where the inputs say them."""
+        at, told = len(self.cell.parameters), inputs[:, len(self.cell.input_names) :]
+        if not told.shape[1]:
+            return values
+        out = values.copy()
+        for attached in self.effects:
+            size = len(attached.effect.quantities)
+            if attached.drawn:
+                out[:, at : at + size], told = told[:, :size], told[:, size:]
             at += size
         return out
 
@@ -159,17 +172,15 @@ class Physics:
         if self.cell.spec.inputs:
             driven = self.drives.fill(driven, self.of_cell(values), command, self.bank, self.time_step)
         controls, recorded = driven[..., :nu], {name for i in self.cell.spec.inputs for name in i.targets}
-        drawn = list(inputs[:, len(self.cell.input_names) :, None].transpose(1, 0, 2))
         for attached, numbers, sites in self.acting(values):
             if attached.effect.controls is not None:
-                own = drawn.pop(0) if attached.effect.scattered and drawn else numbers
                 context = self.context(sites, values)
                 for drive in sites:
                     columns = list(drive.actuators)
                     before = controls[:, 0, columns] if recorded & set(drive.names) else None
                     before = self._standing(drive, values, inputs) if before is None else before
                     told = replace(context, sites=(drive,), before=before)
-                    controls[:, :, columns] = attached.effect.controls(controls[:, :, columns], own, told)
+                    controls[:, :, columns] = attached.effect.controls(controls[:, :, columns], numbers, told)
         return np.ascontiguousarray(driven)
 
     def _standing(self, drive: Site, values: Floats, inputs: Floats) -> Floats | None:

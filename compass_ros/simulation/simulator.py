@@ -149,18 +149,18 @@ class Simulator:
         return np.array([p.default for p in self.parameters])
 
     def inputs(self, commanded: Floats) -> Floats:
-        """(E, A) inputs of the cell with a column of zeros for each scattered effect: an episode's own number of it."""
-        return np.pad(commanded, ((0, 0), (0, sum(a.effect.scattered for a in self.effects))))
+        """(E, A) inputs of the cell, then a column of zeros for each number that an episode has of its own."""
+        return np.pad(commanded, ((0, 0), (0, sum(a.drawn for a in self.effects))))
 
     def launch_std(self, values: Floats, stated: Floats | None = None) -> Floats:
         """(A,) standard deviation of each of these inputs around what was commanded, at (P,) values.
 
         `stated`: what the recordings say (`Recordings.start_std`), beside the cell or where it leaves it to them.
         """
-        own = [n[0, 0] for a, n in self.physics.of_effects(values[None]) if a.effect.scattered]
+        own = [n[0] for a, n in self.physics.of_effects(values[None]) if a.drawn]
         of_cell, said = self.cell.launch_std, 0.0 if stated is None else stated
         beside = np.where(of_cell > 0, np.hypot(of_cell, said), of_cell)
-        return np.append(np.where(np.isnan(of_cell), said, beside), own)
+        return np.concatenate([np.where(np.isnan(of_cell), said, beside), *own])
 
     @property
     def time_step(self) -> float:
@@ -274,6 +274,7 @@ class Simulator:
 
     def begun(self, values: Floats, inputs: Floats, duration: float) -> tuple[Floats, Floats | None, int]:
         """(B, s) states at the start, (B, T, n) what drives MuJoCo for `duration` seconds, and T."""
+        values = self.physics.own(values, inputs)
         start, steps = self.physics.start(values, inputs), self._steps(duration)
         if self.cell.anchors:
             relax(self.physics.model, start[:, 1 : 1 + self.physics.model.nq])
@@ -315,7 +316,7 @@ class Simulator:
     def states(self, values: Floats, inputs: Floats, duration: float) -> tuple[Floats, Floats]:
         """(B, T + 1, s) whole states (mjSTATE_FULLPHYSICS), the start first, and (B, T, n) what drives MuJoCo."""
         start, controls, steps = self.begun(values, inputs, duration)
-        states = self.play(values, start, controls, steps)[0]
+        states = self.play(self.physics.own(values, inputs), start, controls, steps)[0]
         driven = np.empty((len(values), steps, 0)) if controls is None else controls
         return np.concatenate([start[:, None], states], axis=1), driven
 
@@ -359,10 +360,11 @@ class Simulator:
             other = (controls != controls[like]).reshape(len(controls), -1)
             known = np.minimum(known, np.where(other.any(axis=1), other.argmax(axis=1) // controls.shape[2], steps))
         known[(start != start[like]).any(axis=1)] = 0
+        own = self.physics.own(values, inputs)
 
         def play(rows: Ints, begin: Floats, step: int) -> Floats:
             of_rows = None if controls is None else controls[rows, step:]
-            return self.play(values[rows], begin, of_rows, steps - step)[0]
+            return self.play(own[rows], begin, of_rows, steps - step)[0]
 
         columns = 1 + self.physics.dynamics.columns()
         states, same = roll_alike(play, start, steps, columns, like, known, CHUNK)
@@ -381,7 +383,7 @@ class Simulator:
     def _roll(self, values: Floats, inputs: Floats, duration: float, columns: Ints) -> Floats:
         """(B, T + 1, n) the given places of (qpos, qvel, act, sensordata), the start first."""
         start, controls, steps = self.begun(values, inputs, duration)
-        states, sensors = self.play(values, start, controls, steps)
+        states, sensors = self.play(self.physics.own(values, inputs), start, controls, steps)
         places, size = 1 + columns, start.shape[1]
         if not self.physics.model.nsensordata:
             seen = np.empty((len(start), steps + 1, len(places)))

@@ -117,7 +117,7 @@ class Visited:
         """(E, T, s) states, and (E, T, n) what drove MuJoCo with the bits that say what its rows are."""
         simulator, (values, inputs, _) = self._simulator, self._asked
         start, controls, steps = simulator.begun(values, inputs, simulator.physics.duration(*self._asked))
-        states = simulator.play(values, start, controls, steps)[0]
+        states = simulator.play(simulator.physics.own(values, inputs), start, controls, steps)[0]
         return states, (controls, simulator.physics.drives.parts)
 
     @cached_property

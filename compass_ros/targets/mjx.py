@@ -66,8 +66,10 @@ def _of(fitted: FittedEffect, places: Places, exported: Exported, changed: mujoc
     outside = "acts on commands" if law.controls is not None else "acts on what a sensor says"
     if law.forces is None and law.model is None:
         return [], Said(law.name, on, "left out", f"{outside}, outside of the model")
-    if law.rotor or (rotors(changed) and law.model is not None):
-        return [], Said(law.name, on, "left out", "a motor's joint of its own, not tried in MJX")
+    motor = law.rotor or (rotors(changed) and law.model is not None)
+    if law.scattered or motor:
+        why = "a motor's joint of its own, not tried in MJX" if motor else "other numbers in each episode, by chance"
+        return [], Said(law.name, on, "left out", why)
     context = context_in(places, exported, fitted)
     if law.model is not None and law.forces is None:
         law.model(changed, np.array(fitted.values), context)

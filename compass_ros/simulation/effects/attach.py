@@ -7,7 +7,6 @@ import weakref
 from collections.abc import Sequence
 
 import mujoco
-import numpy as np
 
 from compass_ros.cells.derived import set_const
 from compass_ros.errors import ConfigError
@@ -49,7 +48,7 @@ def attach(model: mujoco.MjModel, data: mujoco.MjData, exported: Exported) -> At
     try:
         for fitted, context in acting:
             if fitted.attached.effect.model is not None:
-                fitted.attached.effect.model(model, np.array(fitted.values), context)
+                fitted.attached.effect.model(model, fitted.attached.expected(fitted.values), context)
         programs.__enter__()
     except ConfigError:
         restore(model, before)
@@ -65,7 +64,8 @@ def _terms(places: Places, exported: Exported, acting: Sequence[tuple[FittedEffe
     terms = [table_friction(s, places) for s in exported.sliding.values()]
     for fitted, context in acting:
         kind = fitted.attached.effect
-        own = kind.forces(np.array([fitted.values]), context) if kind.forces is not None else ()
+        numbers = fitted.attached.expected(fitted.values)[None]
+        own = kind.forces(numbers, context) if kind.forces is not None else ()
         if kind.model is None and not own:
             raise _outside(kind)
         terms.extend(own)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +41,15 @@ class Attached:
     def amplitudes(self) -> Bools:
         """(q,) which quantities are amplitudes."""
         return np.array([q.amplitude for q in self.effect.quantities])
+
+    @property
+    def drawn(self) -> int:
+        """How many numbers of its own each episode has of it, by chance."""
+        return len(self.effect.quantities) if self.effect.scattered else 0
+
+    def expected(self, values: Sequence[float]) -> Floats:
+        """(q,) its numbers where nothing is known of a rollout: zero where they differ by chance."""
+        return np.zeros(len(values)) if self.effect.scattered else np.array(values)
 
     def present(self, numbers: Floats) -> bool:
         """Whether any rollout of (B, q) numbers has an amplitude that is not zero."""

@@ -42,6 +42,9 @@ class Quantity:
     """Whether files were written before the law had it; it is zero in them."""
     formerly: tuple[str, str, float] | None = None
     """Its name, unit and what one of that unit is now, in files that say it in another way."""
+    chance: bool = False
+    """Whether it is another number in each episode, by chance around zero, and this its standard deviation: a rollout
+    is given its own as an input beside the cell's (`Simulator.inputs`)."""
     begins: float = 0.0
     """Up to where an amplitude does nothing in what was seen: of a limit, where it is the largest that was reached."""
     grid: int = 0
@@ -86,9 +89,6 @@ class Effect:
     """(B, q) numbers, last time asked for [s] -> how far beyond it the sensor looks [s]; None: not at all."""
     superposes: bool = True
     """Whether small amplitudes add up; False: each direction of the amplitudes is a case of its own."""
-    scattered: bool = False
-    """Whether its number is another one in each episode, by chance around zero: a rollout may be given its own as an
-    input beside the cell's (`Simulator.inputs`), and what a fit finds is the standard deviation."""
     on_joint: Callable[[JointSize], tuple[Quantity, ...]] | None = None
     """Its quantities on a joint, from how that moves and what moves it; None: it acts on no joint."""
     on_drive: Callable[[DriveSize], tuple[Quantity, ...]] | None = None
@@ -123,6 +123,11 @@ class Effect:
     def moves(self) -> bool:
         """Whether it acts on bodies or joints by name."""
         return any(kind in MOVING for kind in self.on)
+
+    @property
+    def scattered(self) -> bool:
+        """Whether its numbers are other ones in each episode, by chance; then all of them are."""
+        return any(q.chance for q in self.quantities)
 
     @property
     def anchored(self) -> bool:

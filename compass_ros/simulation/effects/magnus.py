@@ -1,7 +1,8 @@
 """A push across the motion, as on a spinning body.
 
 F = m rate (-v_y, v_x), for a spin that stays the same over an episode; on a body in space F = m coefficient w x v, w
-its own spin, or F = m (rate_x, rate_y, rate_z) x v where its orientation is not measured and nobody knows how it spins.
+its own spin, or F = m (rate_x, rate_y, rate_z) x v where its orientation is not measured and nobody knows how it spins:
+no two throws have the same spin, so these are other numbers in each episode.
 Source: Magnus force, proportional to spin times speed (Kutta-Joukowski); `rate` holds spin and air density.
 """
 
@@ -27,7 +28,8 @@ def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
 def _on_body(size: BodySize) -> tuple[Quantity, ...]:
     if not size.turns:
         rate = size.acceleration / size.speed
-        return tuple(Quantity(f"rate_{axis}", "1/s", -LARGEST * rate, LARGEST * rate, MODEST * rate) for axis in "xyz")
+        most, modest = LARGEST * rate, MODEST * rate
+        return tuple(Quantity(f"rate_{axis}", "1/s", -most, most, modest, chance=True) for axis in "xyz")
     most = size.acceleration / (size.spin * size.speed)
     return (Quantity("coefficient", "1", -LARGEST * most, LARGEST * most, MODEST * most),)
 

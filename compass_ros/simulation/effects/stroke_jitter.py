@@ -20,9 +20,8 @@ def _controls(controls: Floats, numbers: Floats, context: Context) -> Floats:
 EFFECT = Effect(
     name="stroke_jitter",
     channel="actuation",
-    quantities=(Quantity("deviation", "1", -0.3, 0.3, 0.01),),
+    quantities=(Quantity("deviation", "1", -0.3, 0.3, 0.01, chance=True),),
     sentence="a scatter of the pushing speed",
     on=(*SPEED_DRIVES, "effort_drive"),
     controls=_controls,
-    scattered=True,
 )
