@@ -53,7 +53,7 @@ def throws(tmp_path: Path) -> Cell:
 
 
 def thrown(rates: Floats) -> list[Episode]:
-    """In air of drag coefficient 0.5 (of which MuJoCo has the half as `fluidcoef`), with (E, 3) [1/s] across the way."""
+    """In air of drag coefficient 0.5 (MuJoCo has the half as `fluidcoef`), with (E, 3) [1/s] across the way."""
     rng, out = np.random.default_rng(3), []
     drag = 1.2 * np.pi * 0.033**2 * 0.25 / 0.058
     times = np.arange(0, 1.0, 1 / 100)
