@@ -29,6 +29,10 @@ OF_JOINTS = IN_WORDS | {"strike": "In the drive", "free": "In the motion", "wall
 """The same where nothing slides on a table."""
 
 
+_REGION = ("centre_x", "centre_y", "radius", "core")
+"""Shapes that say where on a table an effect is, which the place in words says."""
+
+
 def where_of(laws: Sequence[Attached], numbers: Floats, movers: Sequence[str]) -> Where:
     """Object, phase, channel and region of the first of some fitted laws; on all sites that it acts on.
 
@@ -100,25 +104,28 @@ def wrong_number(attached: Attached, deviation: float, places: Places) -> str:
 
 
 def value_of(finding: EffectFinding, attached: Attached, told: bool) -> str:
-    """The effect and its amplitudes: 'fan_field, strength 0.21 +- 0.01 m/s^2'; `told`: with what it acts on.
+    """The effect and its numbers: 'fan_field, strength 0.21 +- 0.01 m/s^2'; `told`: with what it acts on.
 
-    Those that are not told from zero stand last. A law that is clearly there and of which that holds for all is known
-    together with its shape, or with numbers of the scene. Of numbers that each episode has by chance: how far they
-    spread.
+    Amplitudes that are not told from zero stand last, shapes that are not are left out, and so is a region. A law that
+    is clearly there and of which that holds for all amplitudes is known together with its shape, or with numbers of the
+    scene. Of numbers that each episode has by chance: how far they spread.
     """
-    sure, open_ = list[str](), list[str]()
+    sure, open_, shapes = list[str](), list[str](), list[str]()
     for quantity in attached.effect.quantities:
+        found = finding.parameters[quantity.name]
+        unit = "" if found.unit == "1" else f" {found.unit}"
+        said = f"{quantity.name} {found.value:.3g} +- {found.std:.1g}{unit}"
+        told_from_zero = abs(found.value) >= ERROR_BARS * found.std
         if quantity.amplitude:
-            found = finding.parameters[quantity.name]
-            unit = "" if found.unit == "1" else f" {found.unit}"
-            to = sure if abs(found.value) >= ERROR_BARS * found.std else open_
-            to.append(f"{quantity.name} {found.value:.3g} +- {found.std:.1g}{unit}")
+            (sure if told_from_zero else open_).append(said)
+        elif told_from_zero and quantity.name not in _REGION:
+            shapes.append(said)
     on = f" of {', '.join(attached.objects)}" if told else ""
     of_chance = " (standard deviations over episodes, each of which has its own)" * attached.effect.scattered
     if not sure:
         return f"{finding.name}{on}, {', '.join(open_)} (shows only together with other numbers)"
     rest = f" (not told from 0: {', '.join(open_)})" if open_ else ""
-    return f"{finding.name}{on}, {', '.join(sure)}{rest}{of_chance}"
+    return f"{finding.name}{on}, {', '.join(sure + shapes)}{rest}{of_chance}"
 
 
 def corrected(laws: Sequence[Attached]) -> str:

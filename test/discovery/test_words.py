@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from compass_ros.discovery.words import place, value_of, where_of
-from compass_ros.simulation.effects import EFFECTS, Attached
+from compass_ros.simulation.effects import EFFECTS, Attached, effect
+from compass_ros.simulation.extents import unit_body
 from compass_ros.types import EffectFinding, EffectParameter, Evidence
 
 
-def test_every_amplitude_and_no_shape_is_said() -> None:
+def test_every_amplitude_is_said_and_shapes_that_are_known_but_for_a_region() -> None:
     numbers = {"tilt_x": EffectParameter(3.1e-3, 5e-5, "rad"), "tilt_y": EffectParameter(-4e-3, 5e-5, "rad")}
     tilt = EffectFinding("table_tilt", numbers, Evidence(0.9, 100.0, 0.001), ())
     said = "table_tilt, tilt_x 0.0031 +- 5e-05 rad, tilt_y -0.004 +- 5e-05 rad"
@@ -20,7 +21,24 @@ def test_every_amplitude_and_no_shape_is_said() -> None:
     found = {q.name: EffectParameter(0.25, 0.01, q.unit) for q in swirl.quantities}
     finding = EffectFinding("swirl", found, Evidence(0.9, 100.0, 0.001), ())
     words = value_of(finding, Attached(swirl, ("puck1",)), told=False)
-    assert words == "swirl, strength 0.25 +- 0.01 m/s^2"
+    assert words == "swirl, strength 0.25 +- 0.01 m/s^2, tail 0.25 +- 0.01"
+
+    cogging = Attached(EFFECTS["cogging"], ("j",))
+    given = {"cosine": (0.0064, 2e-5), "sine": (0.0, 1e-5), "cosine_2": (0.0, 1e-5), "sine_2": (0.0, 1e-5)}
+    for std, said in ((0.02, True), (20.0, False)):
+        known = given | {"periods": (42.0, std)}
+        found = {q.name: EffectParameter(*known[q.name], q.unit) for q in cogging.effect.quantities}
+        words = value_of(EffectFinding("cogging", found, Evidence(0.9, 100.0, 0.001), ()), cogging, told=False)
+        assert words.startswith("cogging, cosine 0.0064 +- 2e-05")
+        assert ("periods 42 +- 0.02" in words) is said
+
+
+def test_of_numbers_that_each_episode_has_it_says_that_they_spread() -> None:
+    magnus = Attached(effect("magnus").at(unit_body(turns=False)), ("ball",))
+    numbers = {q.name: EffectParameter(0.02, 0.003, q.unit) for q in magnus.effect.quantities}
+    words = value_of(EffectFinding("magnus", numbers, Evidence(0.9, 100.0, 0.001), ()), magnus, told=False)
+    assert words.startswith("magnus, rate_x 0.02 +- 0.003 1/s, rate_y")
+    assert words.endswith("(standard deviations over episodes, each of which has its own)")
 
 
 def test_what_is_not_told_from_zero_stands_last() -> None:
