@@ -43,8 +43,6 @@ class Free:
     """Log evidence of the model as it is."""
     log: float
     """Of the same with a free discrepancy, of forces or of signals."""
-    of_forces: bool
-    """Which of the two has the higher evidence."""
     in_time: float
     """Of the same with one of forces in time."""
     pushes: Floats
@@ -61,7 +59,7 @@ def free(response: Response) -> Free:
     best, moments = int(np.argmax(logs[: len(FREE)])), len(response.kicks.moments_s)
     pushes = found[best].pushes.reshape(-1, moments, len(response.unit))
     log = log_sum(np.array([forces, signals, state])) - float(np.log(3))
-    return Free(alone.log, log, max(forces, state) > signals, float(forces), pushes)
+    return Free(alone.log, log, float(forces), pushes)
 
 
 def free_sizes(response: Response) -> list[Floats]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from compass_ros.discovery.discrepancy import Free, spread
@@ -23,11 +25,13 @@ CLEARLY = 3.0
 
 def whereabouts(response: Response, free: Free) -> Where:
     """Site, channel, place and kind of a free discrepancy."""
-    if not free.of_forces:
-        return Where("all", "all", "sensing")
-    n = _site(response)
-    name = response.sites[n].name if n is not None and len(response.sites) > 1 else "all"
     other, best = sorted((shared(response, "velocity"), shared(response, "place")), key=lambda one: one.log)
+    n, moved = _one_or_all(response, [_pushes(response, n) for n in range(len(response.sites))])
+    sensors = _sensors(response)
+    s, read = _one_or_all(response, list(sensors.values()))
+    if read > max(moved, best.log):
+        return Where(list(sensors)[s] if s is not None and len(sensors) > 1 else "all", "all", "sensing")
+    name = response.sites[n].name if n is not None and len(response.sites) > 1 else "all"
     depends_on = _depends_on(best, other, free)
     pushes = free.pushes if depends_on == "time" else best.pushes
     return Where(
@@ -40,17 +44,33 @@ def whereabouts(response: Response, free: Free) -> Where:
     )
 
 
-def _site(response: Response) -> int | None:
-    """The one whose discrepancy alone has the highest evidence; None: that of all has."""
-    count = len(response.site_of)
+def _pushes(response: Response, n: int) -> Floats:
+    """(S,) 1 for the forces on one site."""
+    return np.pad((response.site_of == n).astype(float), (0, len(response.unit) - len(response.site_of)))
+
+
+def _sensors(response: Response) -> dict[str, Floats]:
+    """(S,) 1 for the errors of each encoder, by `signal.joint`, and of each other signal."""
+    out: dict[str, Floats] = {}
+    for signal in response.simulator.cell.signals:
+        if not signal.fitted:
+            continue
+        named = zip(signal.numbers, range(signal.first, signal.first + signal.size), strict=True)
+        each = {f"{signal.name}.{n}": slice(i, i + 1) for n, i in named} if signal.jointed and signal.size > 1 else {}
+        for name, columns in (each or {signal.name: signal.columns}).items():
+            out[name] = np.zeros(len(response.unit))
+            out[name][len(response.site_of) :][columns] = 1.0
+    return out
+
+
+def _one_or_all(response: Response, each: Sequence[Floats]) -> tuple[int | None, float]:
+    """Which of some (S,) parts has the highest evidence for a discrepancy of its own, None: all together; and that."""
     logs = []
-    for chosen in (None, *range(len(response.sites))):
-        on = np.zeros(len(response.unit))
-        on[:count] = 1.0 if chosen is None else response.site_of == chosen
+    for on in (np.sum(each, axis=0), *each):
         found = evidences(response.tangent, [spread(response, s * on * response.unit) for s in FREE])
-        logs.append(log_sum(np.array([f.log for f in found])))
-    best = int(np.argmax(logs)) - 1
-    return best if best >= 0 else None
+        logs.append(log_sum(np.array([f.log for f in found])) - float(np.log(len(FREE))))
+    best = int(np.argmax(logs))
+    return best - 1 if best else None, logs[best]
 
 
 def _depends_on(best: Shared, other: Shared, free: Free) -> DependsOn | None:

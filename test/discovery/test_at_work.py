@@ -10,6 +10,7 @@ from compass_ros.calibration.least_squares import minimise
 from compass_ros.calibration.noise import measure_noise
 from compass_ros.discovery.discrepancy import free
 from compass_ros.discovery.response import Response, respond
+from compass_ros.discovery.where import whereabouts
 from compass_ros.posing import pose
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
@@ -44,5 +45,5 @@ def test_a_joint_that_stands_still_is_sized_by_what_holds_it(held: Response) -> 
 def test_a_push_on_a_joint_that_is_held_is_one_of_forces(held: Response) -> None:
     """And not an error of its encoder, as which it would be seen if it were sized by the joint's acceleration."""
     found = free(held)
-    assert found.of_forces
+    assert whereabouts(held, found).channel == "dynamics"
     assert found.log > found.alone + 100

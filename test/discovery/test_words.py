@@ -25,12 +25,12 @@ def test_every_amplitude_is_said_and_shapes_that_are_known_but_for_a_region() ->
 
     cogging = Attached(EFFECTS["cogging"], ("j",))
     given = {"cosine": (0.0064, 2e-5), "sine": (0.0, 1e-5), "cosine_2": (0.0, 1e-5), "sine_2": (0.0, 1e-5)}
-    for std, said in ((0.02, True), (20.0, False)):
+    for std, sure in ((0.02, True), (20.0, False)):
         known = given | {"periods": (42.0, std)}
         found = {q.name: EffectParameter(*known[q.name], q.unit) for q in cogging.effect.quantities}
         words = value_of(EffectFinding("cogging", found, Evidence(0.9, 100.0, 0.001), ()), cogging, told=False)
         assert words.startswith("cogging, cosine 0.0064 +- 2e-05")
-        assert ("periods 42 +- 0.02" in words) is said
+        assert ("periods 42 +- 0.02" in words) is sure
 
 
 def test_of_numbers_that_each_episode_has_it_says_that_they_spread() -> None:
