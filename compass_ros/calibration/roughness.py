@@ -32,7 +32,8 @@ def with_rough_starts(likelihood: Likelihood, point: Point) -> Likelihood:
     if not moves.any():
         return likelihood
     values = np.tile(point.values, (DRAWS, 1))
-    there, here, back = (_residuals(likelihood, values, point.launch + side * moves) for side in (1, 0, -1))
+    there, back = (_residuals(likelihood, values, point.launch + side * moves) for side in (1, -1))
+    here = _residuals(likelihood, values[:1], point.launch)
     return _grown(likelihood, (there - 2 * here + back) / np.sqrt(6))
 
 
@@ -64,10 +65,8 @@ def _launch_moves(likelihood: Likelihood, rng: np.random.Generator) -> Floats:
 
 def _residuals(likelihood: Likelihood, values: Floats, launch: Floats) -> Floats:
     """(n, E, F, C) with (n, P) values and (n, E, A) launches."""
-    episodes = len(likelihood.inputs)
-    inputs = (likelihood.inputs + np.broadcast_to(launch, (len(values), *likelihood.inputs.shape))).reshape(
-        -1, likelihood.inputs.shape[1]
-    )
+    episodes, numbers = likelihood.inputs.shape
+    inputs = np.broadcast_to(likelihood.inputs + launch, (len(values), episodes, numbers)).reshape(-1, numbers)
     flat = likelihood.residual(np.repeat(values, episodes, axis=0), inputs, np.tile(np.arange(episodes), len(values)))
     return flat.reshape(len(values), episodes, *flat.shape[1:])
 
