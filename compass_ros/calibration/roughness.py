@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from compass_ros.calibration.cost import Point
+from compass_ros.calibration.cost import Point, robust_loss
 from compass_ros.calibration.differences import LAUNCH_STEP, difference_steps
 from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
@@ -42,6 +42,18 @@ def with_roughness(likelihood: Likelihood, fit: Fit) -> Likelihood:
 
     Small random changes of the free parameters and first states must move the trajectories as the linear model says.
     """
+    there, expected = _moved(likelihood, fit)
+    return _grown(likelihood, there - expected)
+
+
+def unsteady(likelihood: Likelihood, fit: Fit) -> float:
+    """Standard deviation of the log likelihood by roughness: what the same small changes do beyond the linear model."""
+    there, expected = (robust_loss(r, fit.robust).sum(axis=(1, 2, 3)) / 2 for r in _moved(likelihood, fit))
+    return float(np.std(there - expected, ddof=1))
+
+
+def _moved(likelihood: Likelihood, fit: Fit) -> tuple[Floats, Floats]:
+    """(n, E, F, C) residuals [sigma] after small changes from a fit, and as its linear model expects them."""
     rng = np.random.default_rng(0)
     free, steps = fit.free, difference_steps(fit.linear)
     moves = SMALL * rng.choice([-1.0, 1.0], (DRAWS, len(free))) * steps / np.sqrt(len(free))
@@ -51,10 +63,10 @@ def with_roughness(likelihood: Likelihood, fit: Fit) -> Likelihood:
     moves = (values - fit.point.values)[:, free] / likelihood.prior_std[free]
     launches = _launch_moves(likelihood, rng)
     random = likelihood.launch_std > 0
-    beyond = _residuals(likelihood, values, fit.point.launch + launches) - fit.linear.residual
-    beyond -= np.einsum("efcp,np->nefc", fit.linear.jacobian, moves)
+    there = _residuals(likelihood, values, fit.point.launch + launches)
+    expected = fit.linear.residual + np.einsum("efcp,np->nefc", fit.linear.jacobian, moves)
     shares = launches[..., random] / likelihood.launch_std[random]
-    return _grown(likelihood, beyond - np.einsum("efcl,nel->nefc", fit.linear.launch_jacobian, shares))
+    return there, expected + np.einsum("efcl,nel->nefc", fit.linear.launch_jacobian, shares)
 
 
 def _launch_moves(likelihood: Likelihood, rng: np.random.Generator) -> Floats:

@@ -2,6 +2,8 @@
 
 Recordings are simulated from the plain model, as its fit plus noise of the recordings' own correlation, and judged to
 first order by the same measure as the real ones: the largest log posterior odds of any model against the plain one.
+What first order does not have is added: where the simulator is rough, fits of the same quality end at log likelihoods
+that scatter, and the odds of two of them do so by the root of two more.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ import numpy as np
 
 from compass_ros.calibration.cost import robust_weight
 from compass_ros.calibration.noise import Noise, correlated
+from compass_ros.calibration.roughness import unsteady
 from compass_ros.discovery.discrepancy import free_sizes, spread
 from compass_ros.discovery.evidence import Factored
 from compass_ros.discovery.first_order import Ranked
@@ -35,7 +38,9 @@ def largest_odds(
     """
     rng, left = np.random.default_rng(seed), round(BEYOND / alpha)
     counts = [min(AT_ONCE, left - begun) for begun in range(0, left, AT_ONCE)]
-    return np.concatenate([_largest_odds(response, ranked, priors, noise, rng, count) for count in counts])
+    odds = np.concatenate([_largest_odds(response, ranked, priors, noise, rng, count) for count in counts])
+    scatter = np.sqrt(2) * unsteady(response.likelihood, response.fit)
+    return np.asarray(odds + scatter * np.random.default_rng(seed).standard_normal(len(odds)))
 
 
 def _largest_odds(
@@ -75,17 +80,14 @@ def simulated(response: Response, noise: Noise, rng: np.random.Generator) -> Flo
     """(E, F, C) residuals [sigma] of recordings of the plain model at its fit; 0 where nothing was measured.
 
     An encoder counts: its error is what the fitted motion makes of whole steps from a zero that nobody knows, and not
-    white. What else there is of noise has the recordings' own correlation. The simulator's roughness is another path
-    from some contact on: one number for each episode and column, as large as it has grown by then.
+    white. What else there is of noise has the recordings' own correlation.
     """
     likelihood, linear = response.likelihood, response.fit.linear
     shape = likelihood.measured.shape
     seen = ~np.isnan(likelihood.measured)
-    rough = np.zeros(shape) if likelihood.rough is None else likelihood.rough / likelihood.sigma
-    path = rough * rng.standard_normal((shape[0], 1, shape[2]))
-    white = np.sqrt(1 - rough**2) * correlated(rng.standard_normal(shape), noise.correlation)
+    white = correlated(rng.standard_normal(shape), noise.correlation)
     if noise.step is None:
-        return np.where(seen, white + path, 0.0)
+        return np.where(seen, white, 0.0)
     step = noise.step
     counts = step > 0
     fitted = np.where(seen, likelihood.measured + linear.residual * likelihood.sigma, 0.0)
@@ -94,4 +96,4 @@ def simulated(response: Response, noise: Noise, rng: np.random.Generator) -> Flo
     size = np.where(counts, step, 1.0)
     read = size * np.round((true + rest * white) / size)
     error = np.where(counts, true - read, white * likelihood.sigma)
-    return np.where(seen, error / likelihood.sigma + path, 0.0)
+    return np.where(seen, error / likelihood.sigma, 0.0)
