@@ -78,7 +78,8 @@ def _launch_moves(likelihood: Likelihood, rng: np.random.Generator) -> Floats:
 def _residuals(likelihood: Likelihood, values: Floats, launch: Floats) -> Floats:
     """(n, E, F, C) with (n, P) values and (n, E, A) launches."""
     episodes, numbers = likelihood.inputs.shape
-    inputs = np.broadcast_to(likelihood.inputs + launch, (len(values), episodes, numbers)).reshape(-1, numbers)
+    rows = len(values) * episodes  # a cell may have no inputs at all
+    inputs = np.broadcast_to(likelihood.inputs + launch, (len(values), episodes, numbers)).reshape(rows, numbers)
     flat = likelihood.residual(np.repeat(values, episodes, axis=0), inputs, np.tile(np.arange(episodes), len(values)))
     return flat.reshape(len(values), episodes, *flat.shape[1:])
 
