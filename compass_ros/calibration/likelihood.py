@@ -139,8 +139,8 @@ class Likelihood:
     def on(self, other: Likelihood) -> Likelihood:
         """The same model and prior for the recordings of another likelihood, which may lack the last inputs."""
         inputs = np.pad(other.inputs, ((0, 0), (0, self.inputs.shape[1] - other.inputs.shape[1])))
-        of = other
-        return replace(self, inputs=inputs, time_s=of.time_s, measured=of.measured, sigma=of.sigma, rough=of.rough)
+        seen = replace(self, inputs=inputs, time_s=other.time_s, measured=other.measured)
+        return replace(seen, sigma=other.sigma, rough=other.rough)
 
     def residual(self, values: Floats, inputs: Floats, episode: Ints) -> Floats:
         """(B, F, C) residuals in sigma for (B, P) values and (B, A) inputs; 0 where nothing was measured."""

@@ -34,13 +34,13 @@ class Augmented(Belief):
         (case,) = self.cases
         simulator, values = case.simulator, case.drawn(len(commands), rng)
         inputs = simulator.inputs(commands)
-        state, controls, steps = simulator.begun(values, inputs, float(time_s[-1]) + self.control_s)
+        own, state, controls, steps = simulator.begun(values, inputs, float(time_s[-1]) + self.control_s)
         assert controls is not None  # a tool is driven
         each = round(self.control_s / simulator.time_step)
         path = [state[:, None]]
         for first in range(0, steps, each):
             told = controls[:, first : first + each]
-            played = simulator.play(values, state, told, told.shape[1])[0]
+            played = simulator.play(own, state, told, told.shape[1])[0]
             state = played[:, -1] = self.corrected(state, told[:, 0], played[:, -1])
             path.append(played)
         raw = np.concatenate(path, axis=1)[:, :, 1 + simulator.physics.dynamics.columns()]
@@ -62,9 +62,9 @@ def augmented(base: Belief, data: Recordings, control_s: float, seed: int) -> Au
     (case,) = base.cases
     simulator, count, each = case.simulator, len(data.steps_s) - 1, round(control_s / case.simulator.time_step)
     values, inputs = case.drawn(len(data.inputs), np.random.default_rng(0)), case.simulator.inputs(data.inputs)
-    start, controls, steps = simulator.begun(values, inputs, count * control_s)
+    own, start, controls, steps = simulator.begun(values, inputs, count * control_s)
     assert controls is not None  # a tool is driven
-    states = np.concatenate([start[:, None], simulator.play(values, start, controls, steps)[0]], axis=1)
+    states = np.concatenate([start[:, None], simulator.play(own, start, controls, steps)[0]], axis=1)
     before = states[:, : count * each : each].reshape(-1, start.shape[1])
     over = _flat(data.measured) - _flat(simulator.observe(values, inputs, data.time_s))
     smooth = [_smooth(time_s, of, data.steps_s) for time_s, of in zip(data.time_s, over, strict=True)]

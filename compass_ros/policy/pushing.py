@@ -63,7 +63,8 @@ class Simulated:
         self._values = case.drawn(self.count, self._rng)
         inputs = np.zeros((self.count, len(cell.input_names)))
         inputs[:, 0] = across + self._repeats * self._rng.standard_normal(self.count)
-        self._state = self._simulator.begun(self._values, self._simulator.inputs(inputs), CONTROL_S)[0]
+        told = self._simulator.inputs(inputs)
+        self._values, self._state, *_ = self._simulator.begun(self._values, told, CONTROL_S)
         self._bias = self._values[:, [cell.index(f"env@camera@bias_{axis}") for axis in "xy"]]
         return self._seen()
 

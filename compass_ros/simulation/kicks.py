@@ -34,8 +34,9 @@ class Kicks:
 def kicks(simulator: Simulator, values: Floats, inputs: Floats, time_s: Floats, count: int) -> Kicks:
     """For (P,) values, (E, A) inputs and (E, F) times [s], at so many moments, in the middle of equal stretches."""
     episodes = len(inputs)
-    tiled = simulator.physics.own(np.tile(values, (episodes, 1)), inputs)
-    start, controls, steps = simulator.begun(tiled, inputs, simulator.physics.duration(tiled, inputs, time_s))
+    tiled = np.tile(values, (episodes, 1))
+    duration = simulator.physics.duration(tiled, inputs, time_s)
+    tiled, start, controls, steps = simulator.begun(tiled, inputs, duration)
     states, sensors = simulator.play(tiled, start, controls, steps)
     states = np.concatenate([start[:, None], states], axis=1)
     middles = (np.arange(count) + 0.5) * steps / count  # of equal stretches: the sum of kicks is an integral's

@@ -272,15 +272,16 @@ class Simulator:
         """The scene at (P,) values; it holds until the next rollout and is not to be changed."""
         return self._player.written(self.physics, values[None])[0]
 
-    def begun(self, values: Floats, inputs: Floats, duration: float) -> tuple[Floats, Floats | None, int]:
-        """(B, s) states at the start, (B, T, n) what drives MuJoCo for `duration` seconds, and T."""
+    def begun(self, values: Floats, inputs: Floats, duration: float) -> tuple[Floats, Floats, Floats | None, int]:
+        """What to play: (B, P) values with each rollout's own numbers of what differs by chance, (B, s) states at the
+        start, (B, T, n) what drives MuJoCo for `duration` seconds, and T."""
         values = self.physics.own(values, inputs)
         start, steps = self.physics.start(values, inputs), self._steps(duration)
         if self.cell.anchors:
             relax(self.physics.model, start[:, 1 : 1 + self.physics.model.nq])
         if self.cell.rotors:
             self._player.carry(self.physics, values, start)
-        return start, self.physics.controls(values, inputs, steps), steps
+        return values, start, self.physics.controls(values, inputs, steps), steps
 
     def motion(self, values: Floats, inputs: Floats, duration: float) -> Motion:
         """Roll out (B, P) values with (B, A) inputs for `duration` seconds."""
@@ -315,8 +316,8 @@ class Simulator:
 
     def states(self, values: Floats, inputs: Floats, duration: float) -> tuple[Floats, Floats]:
         """(B, T + 1, s) whole states (mjSTATE_FULLPHYSICS), the start first, and (B, T, n) what drives MuJoCo."""
-        start, controls, steps = self.begun(values, inputs, duration)
-        states = self.play(self.physics.own(values, inputs), start, controls, steps)[0]
+        own, start, controls, steps = self.begun(values, inputs, duration)
+        states = self.play(own, start, controls, steps)[0]
         driven = np.empty((len(values), steps, 0)) if controls is None else controls
         return np.concatenate([start[:, None], states], axis=1), driven
 
@@ -354,13 +355,12 @@ class Simulator:
         self, values: Floats, inputs: Floats, time_s: Floats, like: Ints, until: Floats
     ) -> tuple[Floats, Floats]:
         """As `observe_alike`. Where start or commands differ, rows differ from there on, whatever was said."""
-        start, controls, steps = self.begun(values, inputs, self.physics.duration(values, inputs, time_s))
+        own, start, controls, steps = self.begun(values, inputs, self.physics.duration(values, inputs, time_s))
         known = np.minimum(until / self.time_step, steps).astype(int)
         if controls is not None:
             other = (controls != controls[like]).reshape(len(controls), -1)
             known = np.minimum(known, np.where(other.any(axis=1), other.argmax(axis=1) // controls.shape[2], steps))
         known[(start != start[like]).any(axis=1)] = 0
-        own = self.physics.own(values, inputs)
 
         def play(rows: Ints, begin: Floats, step: int) -> Floats:
             of_rows = None if controls is None else controls[rows, step:]
@@ -382,8 +382,8 @@ class Simulator:
 
     def _roll(self, values: Floats, inputs: Floats, duration: float, columns: Ints) -> Floats:
         """(B, T + 1, n) the given places of (qpos, qvel, act, sensordata), the start first."""
-        start, controls, steps = self.begun(values, inputs, duration)
-        states, sensors = self.play(self.physics.own(values, inputs), start, controls, steps)
+        own, start, controls, steps = self.begun(values, inputs, duration)
+        states, sensors = self.play(own, start, controls, steps)
         places, size = 1 + columns, start.shape[1]
         if not self.physics.model.nsensordata:
             seen = np.empty((len(start), steps + 1, len(places)))

@@ -116,8 +116,8 @@ class Visited:
     def _states(self) -> tuple[Floats, tuple[Floats | None, int]]:
         """(E, T, s) states, and (E, T, n) what drove MuJoCo with the bits that say what its rows are."""
         simulator, (values, inputs, _) = self._simulator, self._asked
-        start, controls, steps = simulator.begun(values, inputs, simulator.physics.duration(*self._asked))
-        states = simulator.play(simulator.physics.own(values, inputs), start, controls, steps)[0]
+        own, start, controls, steps = simulator.begun(values, inputs, simulator.physics.duration(*self._asked))
+        states = simulator.play(own, start, controls, steps)[0]
         return states, (controls, simulator.physics.drives.parts)
 
     @cached_property
@@ -130,7 +130,7 @@ class Visited:
         """(E, T, n) what drives are told before any law changes it, and T."""
         plain = self._simulator.with_effects(())
         values, inputs, _ = self._asked
-        _, controls, steps = plain.begun(values, inputs, plain.physics.duration(*self._asked))
+        _, _, controls, steps = plain.begun(values, inputs, plain.physics.duration(*self._asked))
         return controls, steps
 
 

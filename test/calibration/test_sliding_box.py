@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compass_ros.cells import load
 from compass_ros.config import CalibrationConfig
 from compass_ros.pipeline import calibrate
 from compass_ros.types import Episode, Floats, Track
+from test.cells.written import content, parameter, written
 
 SCENE = """
 <mujoco>
@@ -25,20 +25,11 @@ SCENE = """
   </worldbody>
 </mujoco>
 """
-CELL = """
-name: slope
-dynamics: mjcf
-model: slope.xml
-control_dt_s: 0.05
-horizon: 39
-noise_m: 0.001
-objects: [{name: crate, quantity: xyz}]
-factors: [crate]
-start: [{object: crate, velocity: track, frames: 9, noise: {position: 0.001, velocity: 0.02}}]
-parameters:
-  - {name: ramp@contact@friction, field: 'geom_friction[0]', of: ramp, unit: '1', default: 0.42, half_width: 0.1,
-     bounds: [0.1, 1]}
-"""
+START = {"object": "crate", "velocity": "track", "frames": 9, "noise": {"position": 0.001, "velocity": 0.02}}
+FRICTION = parameter("ramp@contact@friction", "geom_friction[0]", "ramp", 0.42, 0.1) | {"bounds": [0.1, 1]}
+CELL = content(
+    [{"name": "crate", "quantity": "xyz"}], [FRICTION], start=[START], noise_m=0.001, control_dt_s=0.05, horizon=39
+)
 TRUE, SLOPE, STEP_S, HEIGHT = 0.47, np.deg2rad(15), 1e-3, 0.04
 NOISE = 1e-3
 
@@ -68,15 +59,13 @@ def recordings() -> list[Episode]:
         seen = slid(place, speed, 2.0) @ axes + above
         stamps = 10_000_000 * np.arange(len(seen), dtype=np.int64)
         track = Track("crate", "xyz", stamps, seen + rng.normal(0, NOISE, seen.shape))
-        out.append(Episode(f"run{n}", "slope", "", {}, 0, (track,)))
+        out.append(Episode(f"run{n}", "written", "", {}, 0, (track,)))
     return out
 
 
 @pytest.mark.nightly
 def test_its_friction_is_found_and_nothing_is_missing(tmp_path: Path) -> None:
-    (tmp_path / "slope.xml").write_text(SCENE)
-    (tmp_path / "cell.yaml").write_text(CELL)
-    result, _ = calibrate(recordings(), load(tmp_path / "cell.yaml"), CalibrationConfig(threads=1))
+    result, _ = calibrate(recordings(), written(tmp_path, SCENE, CELL), CalibrationConfig(threads=1))
     (row,) = result.parameters
     gap = {where: (of["fit"].rmse_m, of["held_out"].rmse_m) for where, of in result.gap.items()}
     print(row.value, row.std, gap, result.mismatch.sentence)

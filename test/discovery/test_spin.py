@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from compass_ros.cells import Cell, load
 from compass_ros.config import CalibrationConfig
 from compass_ros.pipeline import calibrate
 from compass_ros.simulation import Simulator
@@ -16,6 +15,7 @@ from compass_ros.simulation.effects import Attached, effect
 from compass_ros.simulation.effects.exported import FittedEffect, read_effects, write_effects
 from compass_ros.simulation.extents import unit_body
 from compass_ros.types import Episode, Floats, Track
+from test.cells.written import content, parameter, written
 
 SCENE = """
 <mujoco>
@@ -28,28 +28,13 @@ SCENE = """
   </worldbody>
 </mujoco>
 """
-CELL = """
-name: throws
-dynamics: mjcf
-model: throws.xml
-control_dt_s: 0.05
-horizon: 20
-noise_m: 0.002
-objects: [{name: ball, quantity: xyz}]
-factors: [ball]
-start: [{object: ball, velocity: track, frames: 9, noise: {position: 0.002, velocity: 0.1}}]
-parameters:
-  - {name: world@gravity@z, field: 'opt.gravity[2]', unit: m/s^2, default: -9.81, half_width: 0.01,
-     bounds: [-9.9, -9.7]}
-"""
+START = {"object": "ball", "velocity": "track", "frames": 9, "noise": {"position": 0.002, "velocity": 0.1}}
+GRAVITY = parameter("world@gravity@z", "opt.gravity[2]", "", -9.81, 0.01) | {"bounds": [-9.9, -9.7]}
+CELL = content(
+    [{"name": "ball", "quantity": "xyz"}], [GRAVITY], start=[START], noise_m=0.002, control_dt_s=0.05, horizon=20
+)
 MAGNUS = Attached(effect("magnus").at(unit_body(turns=False)), ("ball",))
 NOISE_M = 0.002
-
-
-def throws(tmp_path: Path) -> Cell:
-    (tmp_path / "throws.xml").write_text(SCENE)
-    (tmp_path / "cell.yaml").write_text(CELL)
-    return load(tmp_path / "cell.yaml")
 
 
 def thrown(rates: Floats) -> list[Episode]:
@@ -69,12 +54,12 @@ def thrown(rates: Floats) -> list[Episode]:
         path = solve_ivp(change, (0, 1.1), first, t_eval=times, rtol=1e-9, atol=1e-11).y[:3].T
         seen = path + rng.normal(0, NOISE_M, path.shape)
         track = Track("ball", "xyz", np.round(times * 1e9).astype(np.int64), seen)
-        out.append(Episode(f"throw{n}", "throws", "", {}, 0, (track,)))
+        out.append(Episode(f"throw{n}", "written", "", {}, 0, (track,)))
     return out
 
 
 def test_each_rollout_has_its_own_spin_and_a_file_keeps_that(tmp_path: Path) -> None:
-    cell = throws(tmp_path)
+    cell = written(tmp_path, SCENE, CELL)
     simulator = Simulator(cell, [MAGNUS], threads=1)
     commanded = np.tile([0, 0, 1.0, 6, 1, 4], (2, 1)).astype(float)
     inputs, times = simulator.inputs(commanded), np.tile(np.linspace(0, 0.9, 10), (2, 1))
@@ -100,7 +85,9 @@ def test_throws_with_spin_are_told_from_those_without(tmp_path: Path, spins: str
     """Gravity is right, and is not what a fit of throws with spin but without Magnus's force would make of it."""
     rng = np.random.default_rng(5)
     each = {"another": rng.uniform(0.006, 0.03, (10, 1)), "same": np.full((10, 1), 0.02), "none": np.zeros((10, 1))}
-    result, _ = calibrate(thrown(each[spins] * [0.0, 1.0, 0.3]), throws(tmp_path), CalibrationConfig(threads=1))
+    result, _ = calibrate(
+        thrown(each[spins] * [0.0, 1.0, 0.3]), written(tmp_path, SCENE, CELL), CalibrationConfig(threads=1)
+    )
     found = result.mismatch
     (gravity,) = result.parameters
     assert gravity.value == pytest.approx(-9.81, abs=max(4 * gravity.std, 0.003))

@@ -26,7 +26,7 @@ def pushed(
     """(E, F, C) change of what is observed per unit, from rollouts that begin at the moment with another velocity."""
     moment, dof = case
     values = np.tile(simulator.defaults, (len(inputs), 1))
-    _, controls, steps = simulator.begun(values, inputs, simulator.physics.duration(values, inputs, time_s))
+    _, _, controls, steps = simulator.begun(values, inputs, simulator.physics.duration(values, inputs, time_s))
     first = round(known.moments_s[moment] / simulator.time_step)
     model = simulator.physics.model
     ends = []
