@@ -20,7 +20,8 @@ CHROMIUM = Path("/usr/bin/chromium")
 FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage",
-    "--remote-debugging-pipe", "--hide-scrollbars",
+    "--disable-background-timer-throttling", "--disable-backgrounding-occluded-windows",
+    "--disable-renderer-backgrounding", "--remote-debugging-pipe", "--hide-scrollbars",
 )  # fmt: skip
 TIMEOUT_S = 180.0  # a busy machine draws slowly
 CONSOLE = ("Runtime.consoleAPICalled", "Runtime.exceptionThrown", "Log.entryAdded")
@@ -97,11 +98,14 @@ class Page:
         return answer["result"].get("value")
 
     def settle(self) -> None:
-        """Scroll through the page, so that everything is drawn, and wait for two frames."""
+        """Scroll through the page, so that everything is drawn, and wait for two frames; for 2 s if one is lost."""
         self.evaluate(
             """(async () => {
                 document.documentElement.style.scrollBehavior = "auto";
-                const frame = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+                const frame = () => new Promise((done) => {
+                    requestAnimationFrame(() => requestAnimationFrame(done));
+                    setTimeout(done, 2000);
+                });
                 for (let y = 0; y < document.body.scrollHeight; y += 500) { scrollTo(0, y); await frame(); }
                 scrollTo(0, 0); await frame();
             })()"""
