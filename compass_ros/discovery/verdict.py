@@ -160,6 +160,7 @@ class Judge:
         sizes = "; ".join(
             value_of(f, a, names.count(a.effect.name) > 1) for f, a in zip(findings, best.physics, strict=True)
         )
+        sizes = f"the most probable is {sizes}" if verdict == "ambiguous" else sizes
         sizes += corrected(best.corrections)
         gaps = errors(self._before, after, self._floor, self.simulator.unit)
         sentence = f"{place(where, self._flat)}, {lacks}; {sizes}; {gaps}."

@@ -15,6 +15,7 @@ import numpy as np
 
 from compass_ros.discovery import Discovery
 from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.words import listed
 from compass_ros.errors import DataError
 from compass_ros.planning.other_measurements import Moved, between, how_moved, of_unknown
 from compass_ros.planning.trials import Trials, trials
@@ -113,8 +114,17 @@ def _apart(one: Floats, other: Floats) -> Floats:
 
 
 def _other(rivals: Sequence[Hypothesis], pairs: Sequence[tuple[int, int]], word: str, moved: Moved) -> str:
+    """What tells pairs of rivals apart that nothing recorded in this way does; each advice once."""
     names = [frozenset(a.effect.name for a in rival.laws) for rival in rivals]
-    return " ".join(
-        f"No {word} tells {rivals[a].name} from {rivals[b].name}: {between(names[a], names[b], moved)}."
-        for a, b in pairs
-    )
+    of: dict[str, list[tuple[int, int]]] = {}
+    for a, b in pairs:
+        of.setdefault(between(names[a], names[b], moved), []).append((a, b))
+    return " ".join(f"No {word} tells {_pairs(rivals, told)}: {what}." for what, told in of.items())
+
+
+def _pairs(rivals: Sequence[Hypothesis], pairs: Sequence[tuple[int, int]]) -> str:
+    """'a from b', or 'a, b and c apart' where these are all their pairs."""
+    members = sorted({one for pair in pairs for one in pair})
+    if len(members) > 2 and len(pairs) == len(members) * (len(members) - 1) // 2:
+        return f"{listed([rivals[one].name for one in members])} apart"
+    return ", ".join(f"{rivals[a].name} from {rivals[b].name}" for a, b in pairs)

@@ -73,5 +73,12 @@ def test_of_three_models_the_pair_that_stays_is_named(forces: tuple[Hypothesis, 
     assert "No shot tells camera_latency from actuation_delay" in found.sentence
 
 
+def test_what_helps_several_pairs_is_said_once() -> None:
+    """Three errors of a camera that are zero: every shot looks the same to all of them."""
+    found = ask(rival("camera_latency", 0.0), rival("clock_drift", 0.0), rival("camera_scale", 0.0, 0.0, 0.0, 0.0))
+    assert found.sentence.startswith("No shot tells camera_latency, clock_drift and camera_scale apart: put a puck")
+    assert found.sentence.count("No shot") == 1
+
+
 def test_one_model_needs_no_experiment(forces: tuple[Hypothesis, Hypothesis]) -> None:
     assert ask(forces[0]) == NextExperiment("")
