@@ -129,5 +129,5 @@ def test_such_a_law_is_named_with_its_site_and_its_numbers(
     (found,) = mismatch.explanations[0].laws
     assert (found.name, found.sites) == (law, tuple(on.split("+")))
     for name, quantity, number in zip(found.quantities, found.quantities.values(), planted, strict=True):
-        little = 2 * quantity.std if name == "share" else 0.0  # these steps hardly say which side friction is on
-        assert quantity.value == pytest.approx(number, rel=0.05, abs=little if number else 0.01)
+        little = 2 * quantity.std if name in ("share", "hysteresis") else 0.0  # of these such motions say little
+        assert quantity.value == pytest.approx(number, rel=0.05, abs=max(little, 0.0 if number else 0.01))
