@@ -31,10 +31,10 @@ def said(cell_of: Path, laws: Sequence[str], numbers: Sequence[float], force: fl
 @pytest.mark.parametrize(
     ("law", "numbers", "force"),
     [
-        ("coulomb_friction", [0.08, 0.0], 1.0),
+        pytest.param("coulomb_friction", [0.08, 0.0], 1.0, marks=pytest.mark.nightly),
         pytest.param("coulomb_friction", [0.08, 0.0], 1e-3, marks=pytest.mark.nightly),
         pytest.param("coulomb_friction", [0.08, 0.0], 4096.0, marks=pytest.mark.nightly),
-        ("stribeck_friction", [0.15, 1.0, 0.002], 1.0),
+        pytest.param("stribeck_friction", [0.15, 1.0, 0.002], 1.0, marks=pytest.mark.nightly),
         pytest.param("stribeck_friction", [0.15, 1.0, 0.0], 1.0, marks=pytest.mark.nightly),
         pytest.param("stribeck_friction", [0.15, 3.0, 0.0], 1e-3, marks=pytest.mark.nightly),
         pytest.param("quadratic_drag", [0.02], 1.0, marks=pytest.mark.nightly),
