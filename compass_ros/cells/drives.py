@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import mujoco
 import numpy as np
@@ -22,9 +23,12 @@ _OF_TARGET = {"ctrl": 0, "qfrc": 1, "xfrc": 2, "mocap": 3}
 _ONE = {int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)}
 FIELDS = {"input_delay_s": "delay_s", "input_scale": "scale", "input_offset": "offset"}
 """Parameters of an input, and the number of its YAML that each takes the place of."""
+KEPT = 256
+"""Series at time steps that are kept, since every rollout of a window asks for them: a budget of memory, 36 MB for
+seven joints in windows of 5 s at 2 ms. Working them out anew takes a tenth of a search on a two-joint arm."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Drive:
     """The recorded inputs of one episode or window, one for each input of the cell."""
 
@@ -80,9 +84,8 @@ class Drives:
         out[:] = self._rest
         out[..., :nu] = controls
         window = inputs[:, self._column].astype(int)
-        edges = time_step * np.arange(steps + 1)
         for i, bound in enumerate(self._bound if bank else ()):
-            bound.write(out, values, window, [d.time_s[i] for d in bank], [d.value[i] for d in bank], edges)
+            bound.write(out, values, window, bank, i, time_step)
         return out
 
     def _places(self, model: mujoco.MjModel, spec: InputSpec, where: str) -> Ints:
@@ -115,18 +118,15 @@ class _Bound:
         self._numbers = {name: _Number(cell, spec, name, getattr(spec, name), where) for name in FIELDS.values()}
 
     def write(
-        self, out: Floats, values: Floats, window: Ints, time_s: list[Floats], value: list[Floats], edges: Floats
+        self, out: Floats, values: Floats, window: Ints, bank: Sequence[Drive], which: int, time_step: float
     ) -> None:
         delay, scale, offset = (self._numbers[name].of(values) for name in ("delay_s", "scale", "offset"))
         # Rows of one window with one delay share their series: of a Jacobian's rows nearly all do.
-        keys, which = np.unique(np.column_stack([window, delay]), axis=0, return_inverse=True)
+        keys, same = np.unique(np.column_stack([window, delay]), axis=0, return_inverse=True)
+        rated, linear = tuple(self._rated), self._spec.hold == "linear"
         for k, key in enumerate(keys):
-            own = int(key[0])
-            means = held(time_s[own], value[own], edges, key[1:], self._spec.hold == "linear")
-            if self._rated.any():
-                rates = _rates(time_s[own], value[own], edges, key[1:])
-                means = np.where(self._rated, rates, means)
-            for row in np.flatnonzero(which.ravel() == k):
+            means = _at_steps(bank[int(key[0])], which, tuple(key[1:]), rated, linear, out.shape[1], time_step)
+            for row in np.flatnonzero(same.ravel() == k):
                 out[row][:, span(self._places)] = means * scale[row] + np.where(self._rated, 0.0, offset[row])
 
     def begin(self, positions: Floats, values: Floats, window: Ints, time_s: list[Floats], value: list[Floats]) -> None:
@@ -182,6 +182,31 @@ class _Number:
         tuned = np.flatnonzero(self._parameter >= 0)
         out[:, tuned] = values[:, self._parameter[tuned]]
         return out
+
+
+@lru_cache(maxsize=KEPT)
+def _at_steps(
+    drive: Drive,
+    which: int,
+    delay: tuple[float, ...],
+    rated: tuple[bool, ...],
+    linear: bool,
+    steps: int,
+    time_step: float,
+) -> Floats:
+    """(T, D) of one input of a drive, each number late by its delay: its mean over each time step; its rate, where that
+    is asked for. Not to be changed."""
+    time_s, value, edges, late = (
+        drive.time_s[which],
+        drive.value[which],
+        time_step * np.arange(steps + 1),
+        np.array(delay),
+    )
+    means = held(time_s, value, edges, late, linear)
+    if any(rated):
+        means = np.where(rated, _rates(time_s, value, edges, late), means)
+    means.flags.writeable = False
+    return means
 
 
 def held(time_s: Floats, value: Floats, edges: Floats, delay: Floats, linear: bool) -> Floats:
