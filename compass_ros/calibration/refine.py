@@ -181,8 +181,9 @@ def growing(
 ) -> Iterator[tuple[Likelihood, Fit]]:
     """The beginning of each episode and the fit of the strongest parameters to it, longer from one to the next.
 
-    Those `held` stay as they are: a beginning of half a second says nothing of a frequency. `begun`: the strongest
-    ones, where they are known. `horizons`: other shares of the episodes than all that the likelihood has.
+    Those `held` stay as they are until whole episodes are fitted: a beginning of half a second says nothing of a
+    frequency. `begun`: the strongest ones, where they are known. `horizons`: other shares of the episodes than all that
+    the likelihood has.
     """
     point = start(likelihood, values)
     begun = begun or strongest(likelihood, values)
@@ -192,6 +193,8 @@ def growing(
         robust = max(ROBUST, 3.0 * typical_residual(part, point))
         last = share == likelihood.horizons[-1]
         tolerance = 1.0 if last else 5.0
+        if last and len(begun.which) > len(strong):
+            strong, onset = begun.which, None
         fit = minimise(part, point, strong, 4, robust, tolerance, steps=steps[strong], fresh=last, onset=onset)
         point, steps[strong], onset = fit.point, difference_steps(fit.linear), fit.linear.onset
         yield part, fit

@@ -143,7 +143,7 @@ def _near_parent(
 
 
 def _grown(parent: Hypothesis, begun: Begun, likelihood: Likelihood, free: Ints, steps: Floats) -> Point:
-    """All that is free, but for the shapes of the law that begins, fitted on a growing horizon of all episodes."""
+    """All that is free fitted on a growing horizon of all episodes, shapes of the law that begins at last."""
     values = begun.point.values
     wide = np.ones(len(values))
     wide[free] = steps

@@ -108,9 +108,9 @@ def _runner(
     begun: Strongest,
     horizons: tuple[float, ...],
 ) -> Iterator[tuple[Likelihood, Fit]]:
-    """Fits of one model to some episodes, longer from one to the next; shapes stay as they are."""
+    """Fits of one model to some episodes, longer from one to the next; shapes stay as they are until the last."""
     simulator, likelihood = widened(parent.simulator, parent.likelihood, laws)
-    new = len(parent.fit.point.values) + np.flatnonzero(np.concatenate([a.amplitudes for a in laws]))
+    new = np.arange(len(parent.fit.point.values), len(values))
     held = len(simulator.cell.parameters) + shapes((*parent.laws, *laws))
     begun = begun.beside(values, new, np.full(len(new), 1 / WIDTH))
     return growing(likelihood.of(rows), values, held, begun, horizons)

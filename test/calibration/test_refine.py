@@ -44,12 +44,13 @@ def test_a_whole_trajectory_misleads_where_a_growing_horizon_does_not() -> None:
     assert found.fit.point.values[0] == pytest.approx(0.8, abs=3e-3)
 
 
-def test_what_is_held_stays_while_the_horizon_grows() -> None:
-    first = np.array([0.3])
-    *_, (_, free) = growing(ringing(0.8), first)
-    *_, (_, held) = growing(ringing(0.8), first, np.array([0]))
-    assert free.point.values[0] != first[0]
-    assert held.point.values[0] == first[0]
+def test_what_is_held_stays_until_whole_episodes_are_fitted() -> None:
+    near = np.array([0.79])
+    free = [float(fit.point.values[0]) for _, fit in growing(ringing(0.8), near)]
+    *held, last = [float(fit.point.values[0]) for _, fit in growing(ringing(0.8), near, np.array([0]))]
+    assert free[0] != near[0]
+    assert held == [near[0]] * (len(free) - 1)
+    assert last == pytest.approx(0.8, abs=1e-3)
 
 
 def test_a_smooth_simulator_is_not_called_rough() -> None:

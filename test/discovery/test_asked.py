@@ -59,6 +59,7 @@ def near_the_top(found: list[Ranked], law: str, on: tuple[str, ...]) -> Ranked:
         pytest.param("payload", "fore", {"mass": 10.0}, marks=pytest.mark.nightly),
         ("payload", "fore", {"mass": 10.0, "moment_z": -5.0}),
         ("gravity_tilt", "upper+fore", {"tilt_x": 1.0}),
+        ("spring", "e", {"stiffness": 2.0, "rest": -2.6}),
     ],
 )
 def test_a_law_on_one_joint_drive_or_encoder_is_seen_there(
@@ -70,6 +71,8 @@ def test_a_law_on_one_joint_drive_or_encoder_is_seen_there(
     assert found.seen
     if law == "cogging":
         assert found.numbers[2] == pytest.approx(sizes["periods"], rel=0.05)
+    if law == "spring":  # it rests where the arm never comes, a motion of 1 rad to either side
+        assert found.numbers[1] == pytest.approx(sizes["rest"], abs=0.3)
 
 
 @pytest.mark.parametrize(("law", "sizes"), [("pair_attraction", {"strength": 2.0}), ("tether", {"stiffness": 3.0})])

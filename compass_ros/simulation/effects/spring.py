@@ -9,6 +9,8 @@ Source: Hooke's law; Herder 2001, Energy-free systems, ch. 3 (a spring of zero f
 
 from __future__ import annotations
 
+import math
+
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
 from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.simulation.site_kinds import JOINTS
@@ -21,8 +23,10 @@ def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
 
 
 def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
-    """With a rest beyond the ends of what was seen it would rather be a constant push."""
-    most, reach = size.force / size.spread, 3.0 * size.spread
+    """Its rest is any angle of a hinge: one that is wound up, or that carries a link, rests where no motion comes. On a
+    slide it would rather be a constant push far beyond the ends of what was seen."""
+    most = size.force / size.spread
+    reach = max(3.0 * size.spread, math.pi if size.kind == "hinge" else 0.0)
     softening = Quantity("softening", "1", -2.0 / size.spread, 1.0, 0.5, amplitude=False, later=True)
     return (
         Quantity("stiffness", size.unit("/L"), 0.0, LARGEST * most, MODEST * most),
