@@ -17,16 +17,20 @@ from compass_ros.simulation.site_kinds import JOINTS
 from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize, unit_joint
 from compass_ros.types import Floats
 
+NEAR, FARTHEST = 3.0, 10.0
+"""How far from the middle of what was seen a spring may rest, in spreads; the second of a hinge, up to half a turn.
+Farther out it would be a constant push but for a tenth, and one that stiffens would overflow."""
+
 
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
     return tuple(Term(Kind.SPRING, site, numbers) for site in context.sites)
 
 
 def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
-    """Its rest is any angle of a hinge: one that is wound up, or that carries a link, rests where no motion comes. On a
-    slide it would rather be a constant push far beyond the ends of what was seen."""
-    most = size.force / size.spread
-    reach = max(3.0 * size.spread, math.pi if size.kind == "hinge" else 0.0)
+    """A hinge's spring that is wound up, or carries a link, rests where no motion comes."""
+    most, reach = size.force / size.spread, NEAR * size.spread
+    if size.kind == "hinge":
+        reach = max(reach, min(math.pi, FARTHEST * size.spread))
     softening = Quantity("softening", "1", -2.0 / size.spread, 1.0, 0.5, amplitude=False, later=True)
     return (
         Quantity("stiffness", size.unit("/L"), 0.0, LARGEST * most, MODEST * most),
