@@ -196,12 +196,8 @@ def _at_steps(
 ) -> Floats:
     """(T, D) of one input of a drive, each number late by its delay: its mean over each time step; its rate, where that
     is asked for. Not to be changed."""
-    time_s, value, edges, late = (
-        drive.time_s[which],
-        drive.value[which],
-        time_step * np.arange(steps + 1),
-        np.array(delay),
-    )
+    time_s, value = drive.time_s[which], drive.value[which]
+    edges, late = time_step * np.arange(steps + 1), np.array(delay)
     means = held(time_s, value, edges, late, linear)
     if any(rated):
         means = np.where(rated, _rates(time_s, value, edges, late), means)
