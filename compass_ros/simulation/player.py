@@ -84,7 +84,8 @@ def _copied(scene: mujoco.MjModel) -> mujoco.MjModel:
     """A model to write into. One tree is one island: MuJoCo need not look for them, a fifth of an arm's step. Anchors
     are trees that no constraint touches."""
     model = copy.copy(scene)
-    if model.ntree - len(anchors(model)) == 1:
+    beside = {model.jnt_bodyid[anchor] for _, anchor in anchors(model)}
+    if model.ntree - len(beside) == 1:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
     return model
 

@@ -438,7 +438,7 @@ static void carry_anchor(const mjModel* m, mjData* d, int dof, double rate) {
 // Its range is how far the spring bends at rest, k its largest friction over that.
 // `most`: how many terms of a program are such frictions.
 static void hold(const mjModel* m, mjData* d, const Program* program, int most) {
-  int nv = m->nv, n = 0, any = 0;
+  int nv = m->nv, n = 0, any = 0, taken = 0;
   most += d->nf;
   int dofs[most], held[most], solved[most], row[most];   // row: of MuJoCo's own constraint, where it is all there is
   double load[nv], total[nv], after[nv], unit[nv];
@@ -479,7 +479,9 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     low[i] -= d->efc_frictionloss[r], high[i] += d->efc_frictionloss[r], rest[i] += d->efc_frictionloss[r];
     d->efc_frictionloss[r] = 0;
     if (d->nisland) d->iefc_frictionloss[d->map_efc2iefc[r]] = 0;   // where islands are solved, theirs is a copy
+    taken++;
   }
+  if (taken == d->nefc) d->nf = d->nefc = d->nisland = 0;   // nothing is left for the solver, which would start all the same
   for (int i = 0; i < n; i++) {
     int dof = dofs[i], own = m->M_rowadr[dof] + m->M_rownnz[dof] - 1;   // the diagonal is the last of a row
     double v = d->qvel[dof], hard = m->dof_solimp[mjNIMP * dof], longer = fmax(tau[i], m->opt.timestep);
