@@ -102,11 +102,11 @@ def _right(names: Sequence[str], kind: str, laws: Sequence[Json]) -> bool:
 
 
 def _sites(found: Sequence[Json], law: Json) -> bool:
-    """Whether a law is on its sites; a law that has none of its own acts on all.
+    """Whether a law is on its sites; a law that has none of its own acts on all, as one of the world does.
 
     A law between two things is on the one of them that the truth names: a plate, where the other is the ball.
     """
-    own, said = set(law["sites"]), set[str]()
+    own, said = set(law["sites"]) - {"world"}, set[str]()
     for one in found:
         effect = EFFECTS.get(one["name"])
         among = own & set(one["sites"]) if effect and effect.paired else set()

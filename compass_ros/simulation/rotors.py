@@ -78,18 +78,22 @@ def carry(model: mujoco.MjModel, data: mujoco.MjData) -> None:
         load = float(data.qfrc_bias[own] - data.qfrc_passive[own])
         holding = float(model.dof_frictionloss[own] + model.dof_frictionloss[other])
         side = np.clip(load / holding, -1.0, 1.0) if holding > 0 else np.sign(load)
-        twist = _twist(load, float(model.tendon_stiffness[tendon]), float(model.tendon_stiffnesspoly[tendon, 1]))
+        twist = _twist(load, float(model.tendon_stiffness[tendon]), *model.tendon_actfrcrange[tendon])
         data.qpos[model.jnt_qposadr[rotor]] += model.tendon_lengthspring[tendon, 1] * side + twist
 
 
-def _twist(load: float, stiffness: float, cubic: float) -> float:
-    """At which a spring stiffness x + cubic x^3 carries a load, by Newton's method from beyond; 0: there is none.
+def _twist(load: float, stiffness: float, windup: float, force: float) -> float:
+    """Twist x at which a gear carries a load: k x - windup force tanh(k x / force), by Newton's method from beyond,
+    where it is convex; 0: it has no spring.
 
-    Eight steps are exact to 1e-12 where the load makes it up to 65 times as stiff as it is slack.
+    Twelve steps are exact to 1e-12 for a windup of 0.95.
     """
     if stiffness <= 0:
         return 0.0
-    x = load / stiffness
-    for _ in range(8):
-        x -= (stiffness * x + cubic * x**3 - load) / (stiffness + 3 * cubic * x**2)
-    return x
+    if windup <= 0 or force <= 0:
+        return load / stiffness
+    x = (load + np.sign(load) * windup * force) / stiffness
+    for _ in range(12):
+        bent = np.tanh(stiffness * x / force)
+        x -= (stiffness * x - windup * force * bent - load) / (stiffness * (1 - windup * (1 - bent**2)))
+    return float(x)

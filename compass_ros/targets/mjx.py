@@ -33,6 +33,7 @@ _UNSAID: Mapping[Kind, str] = {
     Kind.TANGENTIAL: _NO_PLACE,
     Kind.ROLLING: _NO_PLACE,
     Kind.ADHESION: _NO_PLACE,
+    Kind.WINDUP: "a motor's joint of its own, not tried in MJX",
     Kind.SERVO_DEAD_BAND: "it replaces a servo's own force, which MJX computes after the applied ones",
 }
 

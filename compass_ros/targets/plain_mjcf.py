@@ -221,6 +221,7 @@ def _between(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
         tendon.limited, tendon.solref_limit = int(model.tendon_limited[t]), model.tendon_solref_lim[t]
         tendon.stiffness = [model.tendon_stiffness[t], *model.tendon_stiffnesspoly[t]]
         _set_first(tendon, "damping", float(model.tendon_damping[t]))
+        tendon.frictionloss = float(model.tendon_frictionloss[t])
         for side in (name, f"{PREFIX}{name}"):
             joint, dof = spec.joint(side), int(model.joint(side).dofadr[0])
             joint.armature, joint.frictionloss = float(model.dof_armature[dof]), float(model.dof_frictionloss[dof])
@@ -230,6 +231,8 @@ def _between(spec: mujoco.MjSpec, fitted: FittedEffect) -> Said:
     for s in np.flatnonzero(model.sensor_objid != efforts):
         spec.sensors[s].objname = model.joint(int(model.sensor_objid[s])).name
     begin = f"begin with {PREFIX}JOINT as JOINT's load has it: compass_ros.simulation.rotors.carry(model, data)"
+    if soft := numbers(fitted).get("windup", 0.0):
+        return Said(fitted.attached.effect.name, on, "alike", f"without its windup of {soft:.2g}; {begin}")
     return Said(fitted.attached.effect.name, on, "exact", begin)
 
 

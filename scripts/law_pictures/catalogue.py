@@ -46,7 +46,7 @@ PICTURES: dict[str, Picture] = {
     ),
     "cogging": Picture(torque([0.05, 0.03, 6.0], "angle"), "a torque that repeats as the motor turns"),
     "joint_elasticity": Picture(
-        servo([0.15, 0.02, 0.8, 0.0], rotor=True), "rings after each step, and sags under load"
+        servo([0.15, 0.02, 0.8, 0.0, 0.0, 0.0], rotor=True), "rings after each step, and sags under load"
     ),
     "backlash": Picture(
         servo([0.12, 0.02, 0.8], rotor=True, told=wave, scene=SERVO.replace("<option", '<option gravity="0 0 0"')),

@@ -89,6 +89,13 @@ def test_the_site_is_judged_where_the_law_is_named(sites: tuple[str, ...], right
     assert judge(said, answer("one", LUGRE)).sites_right is right
 
 
+def test_what_acts_on_the_world_acts_on_all_of_it() -> None:
+    """A base that is not level tilts gravity for every link: the answer says the world, and the law the links."""
+    said = result("named", explanation(1.0, "gravity_tilt", sites=("upper_arm", "forearm")))
+    tilted = law("tilted_base", ["gravity_tilt"], sites=("world",))
+    assert judge(said, answer("one", tilted)).sites_right is True
+
+
 @pytest.mark.parametrize(
     ("pairs", "right"),
     [([("plate2", "ball")], True), ([("plate1", "ball")], False), ([("plate2", "ball"), ("plate1", "ball")], False)],

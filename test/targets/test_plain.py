@@ -141,15 +141,16 @@ def test_what_mjcf_has_no_word_for_is_left_out_and_said(scene: Path, tmp_path: P
 
 
 @pytest.mark.parametrize(
-    ("name", "numbers"),
+    ("name", "numbers", "fate"),
     [
-        ("backlash", (0.05, 0.02, 0.7)),
-        ("joint_elasticity", (0.004, 0.02, 0.7, 0.0)),
-        ("joint_elasticity", (0.004, 0.02, 0.7, 0.3)),
+        ("backlash", (0.05, 0.02, 0.7), "exact"),
+        ("joint_elasticity", (0.004, 0.02, 0.7, 0.0, 0.0, 0.0), "exact"),
+        ("joint_elasticity", (0.004, 0.02, 0.7, 0.0, 0.0, 0.2), "exact"),
+        ("joint_elasticity", (0.004, 0.02, 0.7, 0.5, 0.2, 0.0), "alike"),
     ],
 )
 def test_what_is_between_a_motor_and_its_joint_is_plain_mjcf(
-    name: str, numbers: tuple[float, ...], tmp_path: Path
+    name: str, numbers: tuple[float, ...], fate: str, tmp_path: Path
 ) -> None:
     spec = mujoco.MjSpec.from_string(SCENE)
     spec.joint("shoulder").armature = 0.05
@@ -158,9 +159,10 @@ def test_what_is_between_a_motor_and_its_joint_is_plain_mjcf(
     (tmp_path / "scene.xml").write_text(spec.to_xml(), encoding="utf-8")
     laws = exported(fitted(name, ("shoulder",), numbers))
     (said,) = write_plain(tmp_path / "scene.xml", laws, (), tmp_path / "plain.xml")
-    assert said.fate == "exact"
+    assert said.fate == fate
     with_law = swing(tmp_path / "scene.xml", commands(), laws)
-    assert np.abs(with_law - swing(tmp_path / "plain.xml", commands())).max() < 1e-6
+    apart = np.abs(with_law - swing(tmp_path / "plain.xml", commands())).max()
+    assert apart < 1e-6 if fate == "exact" else 1e-6 < apart < 3e-2
     assert np.abs(with_law - swing(tmp_path / "scene.xml", commands())).max() > 1e-3
 
 

@@ -137,7 +137,7 @@ class Effect:
     @property
     def along_path(self) -> bool:
         """Whether it is a force that follows from the path of what it acts on."""
-        return self.forces is not None and self.moves and not self.loaded
+        return self.forces is not None and self.moves and not self.loaded and not self.rotor
 
     @property
     def paired(self) -> bool:
@@ -200,7 +200,9 @@ RESTORED = (
     "jnt_stiffness",
     "pair_solref",
     "sensor_objid",
+    "tendon_actfrcrange",
     "tendon_damping",
+    "tendon_frictionloss",
     "tendon_lengthspring",
     "tendon_limited",
     "tendon_range",

@@ -1,13 +1,15 @@
 """A gear or belt that gives way between a motor and its joint.
 
-tau = twist / compliance (1 + stiffening (twist / compliance)^2) + damping (theta' - q') on the joint and its opposite
-on the motor, twist = theta - q, theta the motor's angle behind the gear, rotor theta'' = drive - tau; damping = 2 x
-0.05 sqrt(rotor / compliance). Zero compliance is absent: motor and joint are one. `rotor` is a part of the joint's
-armature, where the drawing has one; `share` of the joint's damping and dry friction is the motor's. An episode begins
-with the spring as the joint's load at rest twists it.
+tau = k x - windup F tanh(k x / F) + h sign(x') + damping x' on the joint and its opposite on the motor: x = theta - q
+is the twist, theta the motor's angle behind the gear, k = 1 / compliance, F = `windup_force`, h = `hysteresis`, rotor
+theta'' = drive - tau, damping = 2 x 0.05 sqrt(rotor k). It is softer by a share `windup` about no twist, up to F, and
+loses what dry friction within it does. Zero compliance is absent: motor and joint are one. `rotor` is a part of the
+joint's armature, where the drawing has one; `share` of the joint's damping and dry friction is the motor's. An episode
+begins with the spring as the joint's load at rest twists it.
 Source: Spong 1987, flexible-joint robots; 0.05 of critical damping is usual in geared and belt drives (Albu-Schaeffer,
-Ott and Hirzinger 2007); harmonic drives stiffen as a cubic (Tuttle and Seering 1996), to the double at most within what
-they carry. In MuJoCo: a second joint, and a tendon with stiffness between them.
+Ott and Hirzinger 2007); wind-up that is soft and hysteresis are what harmonic drives show (Tuttle and Seering 1996;
+Taghirad and Belanger 1998). In MuJoCo: a second joint, and a tendon with stiffness, damping and frictionloss between
+them; the wind-up is a force of `native/fields.c`.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import mujoco
 import numpy as np
 
 from compass_ros.simulation.effects.effect import Context, Effect, Quantity
+from compass_ros.simulation.native.program import Kind, Term
 from compass_ros.simulation.rotors import onto_rotor, rotorless
 from compass_ros.simulation.site_kinds import JOINTS
 from compass_ros.simulation.sizes import LARGEST, MODEST, JointSize, unit_joint
@@ -31,26 +34,37 @@ if either side were heavier by damping x step: here 5 % of the rotor, and less f
 
 
 def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
-    compliance, rotor, share, stiffening = numbers
+    compliance, rotor, share, windup, windup_force, hysteresis = numbers
     if compliance <= 0:
         return
     for site in context.sites:
         tendon, inertia = onto_rotor(model, site.name, rotor, share)
         stiffness = min(1 / compliance, inertia * (_FASTEST / model.opt.timestep) ** 2)
         model.tendon_stiffness[tendon] = stiffness
-        model.tendon_stiffnesspoly[tendon, 1] = stiffening * stiffness**3
+        model.tendon_actfrcrange[tendon] = windup, windup_force  # not limited: they mean nothing to MuJoCo
         model.tendon_damping[tendon] = 2 * _DAMPING_RATIO * np.sqrt(inertia * stiffness)
         model.tendon_limited[tendon] = 0
+        model.tendon_frictionloss[tendon] = hysteresis
+
+
+def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
+    if not numbers[:, 3].any():
+        return ()
+    return tuple(Term(Kind.WINDUP, site, numbers[:, 3:5]) for site in context.sites)
 
 
 def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
-    """What gives way by the whole travel under the joint's own force would be no gear."""
-    most, load = size.spread / size.force, size.force**-2
-    squared = " ".join(f"{unit}^2" for unit in size.force_unit.split())
+    """What gives way by the whole travel under the joint's own force would be no gear, nor one that is no stiffer about
+    no twist than a twentieth of what it is."""
+    most, force, unit = size.spread / size.force, size.force, size.force_unit
     return (
-        Quantity("compliance", f"{size.length_unit}/{size.force_unit}", 0.0, LARGEST * most, MODEST * most),
+        Quantity("compliance", f"{size.length_unit}/{unit}", 0.0, LARGEST * most, MODEST * most),
         *rotor_of(size),
-        Quantity("stiffening", f"1/{squared}", 0.0, load, 0.1 * load, amplitude=False, later=True),
+        Quantity("windup", "1", 0.0, 0.95, 0.1, amplitude=False, start=0.3, later=True),
+        Quantity(
+            "windup_force", unit, 0.01 * force, force, 0.1 * force, amplitude=False, start=0.2 * force, later=True
+        ),
+        Quantity("hysteresis", unit, 0.0, LARGEST * force, MODEST * force, amplitude=False, later=True),
     )
 
 
@@ -70,6 +84,7 @@ EFFECT = Effect(
     quantities=_on_joint(unit_joint("hinge")),
     sentence="a gear or belt that gives way",
     on=JOINTS,
+    forces=_forces,
     model=_model,
     on_joint=_on_joint,
     unable=rotorless,

@@ -20,7 +20,7 @@ enum Kind {
   FRICTION_PATCH = 9, FRICTION_GRADIENT = 10, ANISOTROPIC = 11, STRIBECK = 12, COULOMB = 13, MAGNUS = 14, PULSATING = 15,
   RATE_RESTITUTION = 16, TANGENTIAL = 17, LIBRARY = 18, HAT = 19, TILT = 20, SPRING = 21,
   ASYMMETRIC = 22, LOAD_FRICTION = 23, COGGING = 24, GRAVITY_TILT = 25, WIND = 26, BUOYANCY = 27, SERVO_DEAD_BAND = 28,
-  ADHESION = 29, ROLLING = 30, PAIR_ATTRACTION = 31, TETHER = 32,
+  ADHESION = 29, ROLLING = 30, PAIR_ATTRACTION = 31, TETHER = 32, WINDUP = 33,
 };
 
 // What the object is, and so where its forces go: a body that slides along x and y, the same with a hinge about z after
@@ -83,7 +83,7 @@ int compass_init(ApplyFT apply, FwdActuation actuation, Rne bias, SolveM solve, 
   is_sparse = sparse;
   island = islands;
   project = projects;
-  return TETHER;
+  return WINDUP;
 }
 
 // Gives a model its program. Returns 0 where it has one already, or where three quarters of the table are taken.
@@ -400,6 +400,19 @@ static void tangential_impulse(const mjModel* m, mjData* d, const Term* term) {
 #include "sliding.h"
 #include "drives.h"
 
+// How much softer a gear is about no twist (effects/joint_elasticity.py). p: windup, windup_force, -, -, the rotor's joint, and
+// the tendon between the two, which has the spring.
+static void windup(const mjModel* m, mjData* d, const Term* term) {
+  const double* p = term->number;
+  int rotor = (int)p[4];
+  double stiffness = m->tendon_stiffness[(int)p[5]];
+  if (stiffness <= 0 || p[1] <= 0) return;
+  double twist = d->qpos[m->jnt_qposadr[rotor]] - d->qpos[m->jnt_qposadr[term->id]];
+  double back = p[0] * p[1] * tanh(stiffness * twist / p[1]);
+  d->qfrc_passive[m->jnt_dofadr[rotor]] += back;
+  d->qfrc_passive[term->dof] -= back;
+}
+
 // --- what MuJoCo calls --------------------------------------------------------------------------------------------------
 
 // Solves a (n, n) symmetric positive definite system in place by Cholesky's factors; `x` holds the right side, then the
@@ -556,6 +569,7 @@ void compass_passive(const mjModel* m, mjData* d) {
       case ADHESION: adhesion(m, d, term); break;
       case ROLLING: rolling_resistance(m, d, term); break;
       case PAIR_ATTRACTION: case TETHER: between(m, d, term); break;
+      case WINDUP: windup(m, d, term); break;
       case SERVO_DEAD_BAND: servo_dead_band(m, d, term); break;
       default:
         if (dry(term)) holding++;

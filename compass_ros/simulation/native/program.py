@@ -12,7 +12,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from compass_ros.cells.rotors import ANCHOR
+from compass_ros.cells.rotors import ANCHOR, PREFIX
 from compass_ros.errors import ConfigError
 from compass_ros.simulation.native.compiled import compiled_forces
 from compass_ros.simulation.site_kinds import DRIVES, JOINTS, PLANAR
@@ -61,6 +61,7 @@ class Kind(IntEnum):
     ROLLING = 30
     PAIR_ATTRACTION = 31
     TETHER = 32
+    WINDUP = 33
 
 
 SLIDING = (Kind.STRIBECK, Kind.FRICTION_PATCH, Kind.FRICTION_GRADIENT, Kind.ANISOTROPIC)
@@ -108,6 +109,10 @@ class Programs:
             row["number"][:, : term.numbers.shape[1]] = term.numbers
             if term.kind == Kind.STRIBECK and term.site is not None and term.site.kind in JOINTS:
                 row["number"][:, 4] = mujoco.mj_name2id(models[0], mujoco.mjtObj.mjOBJ_JOINT, ANCHOR + term.site.name)
+            elif term.kind == Kind.WINDUP and term.site is not None:
+                name = PREFIX + term.site.name
+                row["number"][:, 4] = mujoco.mj_name2id(models[0], mujoco.mjtObj.mjOBJ_JOINT, name)
+                row["number"][:, 5] = mujoco.mj_name2id(models[0], mujoco.mjtObj.mjOBJ_TENDON, name)
         self._programs = np.zeros(len(models), _PROGRAM)
         self._programs["n"] = len(terms)
         self._programs["term"] = self._block.ctypes.data + self._block.strides[0] * np.arange(len(models))

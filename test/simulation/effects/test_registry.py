@@ -29,8 +29,8 @@ NAMES = {
     "sensing": "camera_latency camera_scale camera_rotation lens_distortion rolling_shutter tracking_lag clock_drift "
     "latency scale offset rotation eccentricity",
 }
-TWICE = {"dead_band", "stribeck_friction"}
-"""Laws with two hooks: a dead band by the kind of drive; friction on a joint is a force, whose spring the scene has."""
+TWICE = {"dead_band", "joint_elasticity", "stribeck_friction"}
+"""Laws with two hooks: a dead band by the kind of drive; of a gear and of a joint's friction the scene has springs."""
 SHOTS = np.vstack([DESCRIBED, WIDE[:1]])
 
 

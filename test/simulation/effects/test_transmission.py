@@ -8,6 +8,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from compass_ros.cells import Cell
 from compass_ros.errors import ConfigError
@@ -25,6 +26,8 @@ DRIVES = {
     "motor": '<motor name="d" joint="axis"/>',
 }
 SECONDS, TOLD = 0.6, 0.5
+GEAR = (ROTOR, 0.0, 0.0, 0.0, 0.0)
+"""Of a gear whose spring is linear: rotor, share, windup, windup_force, hysteresis."""
 
 
 def geared(folder: Path, drive: str = "position", armature: float = ROTOR, kind: str = "hinge") -> Cell:
@@ -61,24 +64,30 @@ def test_an_elastic_joint_is_two_masses_and_a_spring(tmp_path: Path, kind: str, 
         drive_torque = KP * (TOLD - q[1]) - KV * v[1] if drive == "position" else TOLD
         return np.array([torque / LINK, (drive_torque - torque) / ROTOR])
 
-    seen = angle(geared(tmp_path, drive, kind=kind), {"joint_elasticity": (compliance, ROTOR, 0.0, 0.0)}, kind=kind)
+    seen = angle(geared(tmp_path, drive, kind=kind), {"joint_elasticity": (compliance, *GEAR)}, kind=kind)
     expected = flown(formula, np.array([0.2, 0.2]), np.zeros(2), SECONDS, 2000)[0]
     rigid = angle(geared(tmp_path, drive, kind=kind), {}, kind=kind)
     assert np.abs(seen[:, 0] - rigid[:, 0]).max() > 2e-3
     assert seen[-1, 0] == pytest.approx(expected, abs=2e-3 * abs(expected) + 5e-4)
 
 
-@pytest.mark.parametrize("stiffening", [0.0, 4.0, 40.0])
-def test_a_gear_stiffens_as_a_cubic(tmp_path: Path, stiffening: float) -> None:
+@pytest.mark.parametrize(
+    ("windup", "force", "loss"), [(0.5, 0.2, 0.0), (0.95, 0.1, 0.0), (0.0, 0.0, 0.1), (0.8, 0.3, 0.05)]
+)
+def test_a_gear_is_soft_at_first_and_loses_what_friction_within_it_does(
+    tmp_path: Path, windup: float, force: float, loss: float
+) -> None:
     compliance = 0.2
     damping = 0.1 * np.sqrt(ROTOR / compliance)
 
     def formula(t: float, q: Floats, v: Floats) -> Floats:
-        spring = (q[1] - q[0]) / compliance
-        torque = spring * (1 + stiffening * spring**2) + damping * (v[1] - v[0])
+        spring, rate = (q[1] - q[0]) / compliance, v[1] - v[0]
+        torque = spring + damping * rate + loss * np.tanh(rate / 0.01)
+        if windup:
+            torque -= windup * force * np.tanh(spring / force)
         return np.array([torque / LINK, (TOLD - torque) / ROTOR])
 
-    seen = angle(geared(tmp_path, "motor"), {"joint_elasticity": (compliance, ROTOR, 0.0, stiffening)})[-1, 0]
+    seen = angle(geared(tmp_path, "motor"), {"joint_elasticity": (compliance, ROTOR, 0.0, windup, force, loss)})[-1, 0]
     expected = flown(formula, np.array([0.2, 0.2]), np.zeros(2), SECONDS, 2000)[0]
     assert seen == pytest.approx(expected, abs=2e-3 * abs(expected) + 5e-4)
 
@@ -86,7 +95,7 @@ def test_a_gear_stiffens_as_a_cubic(tmp_path: Path, stiffening: float) -> None:
 def test_a_stiff_gear_is_a_rigid_one(tmp_path: Path) -> None:
     cell = geared(tmp_path)
     rigid = angle(cell, {})
-    for name, numbers in (("joint_elasticity", (1e-5, ROTOR, 0.0, 0.0)), ("backlash", (1e-7, ROTOR, 0.0))):
+    for name, numbers in (("joint_elasticity", (1e-5, *GEAR)), ("backlash", (1e-7, ROTOR, 0.0))):
         assert np.abs(angle(cell, {name: numbers})[:, 0] - rigid[:, 0]).max() < 3e-3
 
 
@@ -132,7 +141,7 @@ def test_friction_is_shared_with_the_motor(tmp_path: Path, share: float) -> None
 
     cell = geared(tmp_path, "motor")
     law = Attached(effect("joint_elasticity").at(unit_joint("hinge")), ("axis",))
-    values = np.array([[lost, compliance, ROTOR, share, 0.0]])
+    values = np.array([[lost, compliance, ROTOR, share, 0.0, 0.0, 0.0]])
     seen = Simulator(cell, [law], threads=1).motion(values, np.array([[TOLD, 0.2]]), SECONDS).positions[0, -1, 0]
     expected = flown(formula, np.array([0.2, 0.2]), np.zeros(2), SECONDS, 2000)[0]
     assert seen == pytest.approx(expected, abs=2e-3 * abs(expected) + 5e-4)
@@ -158,7 +167,7 @@ def test_a_motor_that_sticks_holds_its_joint_within_the_play(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("name", ["joint_elasticity", "backlash"])
 def test_the_measured_effort_is_the_motors(tmp_path: Path, name: str) -> None:
-    numbers = (0.05, ROTOR, 0.0, 0.0) if name == "joint_elasticity" else (0.05, ROTOR, 0.0)
+    numbers = (0.05, *GEAR) if name == "joint_elasticity" else (0.05, ROTOR, 0.0)
     seen = angle(geared(tmp_path, "motor"), {name: numbers})
     np.testing.assert_allclose(seen[5:, 1], TOLD)
 
@@ -169,18 +178,18 @@ def test_the_rotor_is_a_part_of_the_armature(tmp_path: Path, armature: float) ->
 
     But for the inertia that damping between two trees of bodies is to an implicit integrator: 2 x 5 % of the rotor.
     """
-    seen = angle(geared(tmp_path, "motor", armature), {"joint_elasticity": (1e-4, ROTOR, 0.0, 0.0)})[-1, 0]
+    seen = angle(geared(tmp_path, "motor", armature), {"joint_elasticity": (1e-4, *GEAR)})[-1, 0]
     inertia = LINK + (armature or ROTOR)
     assert seen == pytest.approx(0.2 + 0.5 * TOLD / inertia * SECONDS**2, rel=0.1 * ROTOR / inertia + 1e-3)
 
 
 def test_play_beside_an_elasticity_is_a_spring_with_a_dead_band(tmp_path: Path) -> None:
     """In either order."""
-    numbers = {"joint_elasticity": (0.05, ROTOR, 0.0, 0.0), "backlash": (0.1, ROTOR, 0.0)}
+    numbers = {"joint_elasticity": (0.05, *GEAR), "backlash": (0.1, ROTOR, 0.0)}
     cell = geared(tmp_path)
     both = angle(cell, numbers)
     np.testing.assert_array_equal(both, angle(cell, dict(reversed(numbers.items()))))
-    assert np.abs(both - angle(cell, {"joint_elasticity": (0.05, ROTOR, 0.0, 0.0)}))[:, 0].max() > 5e-3
+    assert np.abs(both - angle(cell, {"joint_elasticity": (0.05, *GEAR)}))[:, 0].max() > 5e-3
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.5, 20.0])
@@ -199,11 +208,12 @@ def test_an_arm_that_rests_begins_with_its_gear_loaded(tmp_path: Path, friction:
     objects = [{"name": "axis", "quantity": "joint"}]
     damping = parameter("axis@dyna@damping", "dof_damping", "axis", 0.0, 0.001)
     cell = written(tmp_path, scene, content(objects, [damping], action=[ctrl, first], factors=["axis"]))
-    cubic, flank = 0.5, 0.5 * play * min(weight / (friction or 1e-9), 1)
-    spring = float(np.roots([cubic, 0, 1, -weight])[-1].real)  # spring + cubic spring^3 = weight
+    flank = 0.5 * play * min(weight / (friction or 1e-9), 1)
+    windup, force = 0.7, 1.5
+    spring = float(brentq(lambda s: s - windup * force * np.tanh(s / force) - weight, 0, 9))
     for numbers, twist in (
-        ({"joint_elasticity": (compliance, ROTOR, 0.0, 0.0)}, weight * compliance),
-        ({"joint_elasticity": (compliance, ROTOR, 0.0, cubic)}, spring * compliance),
+        ({"joint_elasticity": (compliance, *GEAR)}, weight * compliance),
+        ({"joint_elasticity": (compliance, ROTOR, 0.0, windup, force, 0.0)}, spring * compliance),
         ({"backlash": (play, ROTOR, 0.0)}, flank),
     ):
         seen = angle(cell, numbers, told=0.2 + twist, kind="slide")[:, 0]
