@@ -148,13 +148,12 @@ def _on_drives(effect: Effect, simulator: Simulator, visited: Visited) -> Iterat
     """All drives of a kind together, and each alone; without names all of the cell where they are of one kind."""
     every = [drive for drive in simulator.places.drives if drive.kind in effect.on]
     able = [drive for drive in every if effect.takes(simulator.places.model, drive)]
-    forces = visited.drive_forces() if effect.model is not None else None
     for kind in dict.fromkeys(drive.kind for drive in able):
         for drives in choices(effect, [drive for drive in able if drive.kind == kind]):
             objects = () if drives == every and not effect.by_name else names_of(drives)
             if effect.on_drive is None or kind == "tool_drive":
                 sized: Effect = effect
-            elif (size := visited.drive_size(drives, forces)).command > 0:
+            elif (size := visited.drive_size(drives, effect.model is not None)).command > 0:
                 sized = effect.at(size)
             else:
                 continue  # what was never told anything cannot show it

@@ -77,6 +77,8 @@ class DriveSize:
     """Largest that one of its actuators exerted, by absolute value, in the actuator's unit."""
     seconds: float = 1.0
     """How long it was told something."""
+    speed: float = 1.0
+    """Fastest that one of its actuators moved, by absolute value, in the actuator's unit."""
 
 
 def joint_sizes(
@@ -112,10 +114,10 @@ def joint_sizes(
     return out
 
 
-def largest_forces(model: mujoco.MjModel, states: Floats, driven: tuple[Floats | None, int]) -> Floats:
-    """(nu,) the largest force of each actuator, by absolute value, in the moments of `joint_sizes`."""
+def actuators_most(model: mujoco.MjModel, states: Floats, driven: tuple[Floats | None, int]) -> Floats:
+    """(2, nu) the largest force and speed of each actuator, by absolute value, in the moments of `joint_sizes`."""
     data = mujoco.MjData(model)
-    rows = [data.actuator_force.copy() for _ in moments(model, data, states, driven)]
+    rows = [np.stack([data.actuator_force, data.actuator_velocity]) for _ in moments(model, data, states, driven)]
     return np.asarray(np.abs(rows).max(axis=0))
 
 

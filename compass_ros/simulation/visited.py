@@ -24,7 +24,7 @@ from compass_ros.simulation.extents import (
 from compass_ros.simulation.simulator import Simulator
 from compass_ros.simulation.site_kinds import JOINTS, SiteKind
 from compass_ros.simulation.sites import Site
-from compass_ros.simulation.sizes import DriveSize, JointSize, command_unit, joint_sizes, largest_forces
+from compass_ros.simulation.sizes import DriveSize, JointSize, actuators_most, command_unit, joint_sizes
 from compass_ros.simulation.touching import touching
 from compass_ros.types import Floats
 
@@ -97,20 +97,22 @@ class Visited:
         bodies = [s for s in simulator.places.signals if s.kind == "camera" and len(s.columns) > 1]
         return camera_size(bodies, self._observed, simulator.cell.spec.noise_m)
 
-    def drive_forces(self) -> Floats:
-        """(nu,) the largest force of each actuator."""
-        return largest_forces(self._simulator.written(self._values), *self._states)
+    @cached_property
+    def _drives(self) -> Floats:
+        """(2, nu) the largest force and speed of each actuator."""
+        return actuators_most(self._simulator.written(self._values), *self._states)
 
-    def drive_size(self, drives: Sequence[Site], forces: Floats | None = None) -> DriveSize:
+    def drive_size(self, drives: Sequence[Site], pushed: bool = False) -> DriveSize:
         """What drives of one kind are told.
 
-        `forces`: (nu,) what the actuators exert there (`drive_forces`); without them that is taken for one.
+        `pushed`: with what their actuators exert and how fast they are there; without, both are taken for one.
         """
         controls, steps = self._commands
         unit = command_unit(self._simulator.physics.model, drives[0])
         told = [np.linalg.norm(controls[:, :, list(d.actuators)], axis=2).max() for d in drives if controls is not None]
-        force = 1.0 if forces is None else float(max(forces[i] for d in drives for i in d.actuators)) or 1.0
-        return DriveSize(drives[0].kind, float(max(told)), unit, force, steps * self._simulator.time_step)
+        own = [i for d in drives for i in d.actuators]
+        force, speed = (float(most) or 1.0 for most in (self._drives[:, own].max(axis=1) if pushed else (1.0, 1.0)))
+        return DriveSize(drives[0].kind, float(max(told)), unit, force, steps * self._simulator.time_step, speed)
 
     @cached_property
     def _states(self) -> tuple[Floats, tuple[Floats | None, int]]:

@@ -28,13 +28,15 @@ _NO_TERMS = "TERMS: tuple[Term, ...] = ()"
 _UNCHANGED = "CHANGED: dict[str, Any] = {}"
 _DRY = (Kind.COULOMB, Kind.STRIBECK, Kind.ASYMMETRIC, Kind.LOAD_FRICTION)
 _NO_PLACE = "MJX offers no place between its contacts and their solver"
+_REPLACES = "it replaces a drive's own force, which MJX computes after the applied ones"
 _UNSAID: Mapping[Kind, str] = {
     Kind.RATE_RESTITUTION: _NO_PLACE,
     Kind.TANGENTIAL: _NO_PLACE,
     Kind.ROLLING: _NO_PLACE,
     Kind.ADHESION: _NO_PLACE,
     Kind.WINDUP: "a motor's joint of its own, not tried in MJX",
-    Kind.SERVO_DEAD_BAND: "it replaces a servo's own force, which MJX computes after the applied ones",
+    Kind.TORQUE_SPEED: _REPLACES,
+    Kind.SERVO_DEAD_BAND: _REPLACES,
 }
 
 
@@ -72,10 +74,10 @@ def _of(fitted: FittedEffect, places: Places, exported: Exported, changed: mujoc
         why = "a motor's joint of its own, not tried in MJX" if motor else "other numbers in each episode, by chance"
         return [], Said(law.name, on, "left out", why)
     context = context_in(places, exported, fitted)
-    if law.model is not None and law.forces is None:
+    terms = list(law.forces(np.array([fitted.values]), context)) if law.forces is not None else []
+    if law.model is not None and not terms:
         law.model(changed, np.array(fitted.values), context)
         return [], Said(law.name, on, "exact", "by `prepare`")
-    terms = list(law.forces(np.array([fitted.values]), context)) if law.forces is not None else []
     unsaid = [why for term in terms if (why := _unsaid(term))]
     if unsaid or not terms:
         return [], Said(law.name, on, "left out", (unsaid or [f"{outside}, outside of the model"])[0])

@@ -104,7 +104,7 @@ PICTURES: dict[str, Picture] = {
     "heading_bias": Picture(heading, "every push is turned by the same angle"),
     "stroke_jitter": Picture(jitter, "the same command comes out differently each time"),
     "torque_saturation": Picture(
-        servo([1 / 1.0], ("servo",)), "hard moves take longer and overshoot, easy ones are right"
+        servo([1 / 1.0, 0.0], ("servo",)), "hard moves take longer and overshoot, easy ones are right"
     ),
     "rate_limit": Picture(command([0.35], steps), "steps become ramps"),
     "gain_error": Picture(command([-0.2], swing), "every command is too small or too large by the same share"),

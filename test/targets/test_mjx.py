@@ -120,7 +120,15 @@ def test_every_kind_of_force_is_written_or_said(scene: Callable[[str], Path], tm
     """A kind that is new in fields.c has to be decided on here too."""
     source = SOURCE.read_text(encoding="utf-8")
     inner = {Kind.LIBRARY, Kind.HAT}  # of the search for laws, not of any law
-    others = {Kind.RATE_RESTITUTION, Kind.TANGENTIAL, Kind.ROLLING, Kind.ADHESION, Kind.SERVO_DEAD_BAND, Kind.WINDUP}
+    others = {
+        Kind.RATE_RESTITUTION,
+        Kind.TANGENTIAL,
+        Kind.ROLLING,
+        Kind.ADHESION,
+        Kind.SERVO_DEAD_BAND,
+        Kind.WINDUP,
+        Kind.TORQUE_SPEED,
+    }
     unknown = {kind for kind in Kind if f'"{kind.name.lower()}"' not in source}
     assert unknown == inner | others
     said = write_mjx(scene(ARM), exported(SMOOTH + DRY), tmp_path / "laws_mjx.py")

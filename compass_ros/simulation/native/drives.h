@@ -2,6 +2,12 @@
 
 static double within(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
 
+// Lets an actuator exert more than MuJoCo lets it.
+static void exerts_more(const mjModel* m, mjData* d, int actuator, double force) {
+  const int first = d->moment_rowadr[actuator], count = d->moment_rownnz[actuator];
+  for (int k = first; k < first + count; k++) d->qfrc_passive[d->moment_colind[k]] += d->actuator_moment[k] * force;
+}
+
 // A position servo that does nothing while its error is within a band, and beyond it answers what is more, or with a share
 // of the band at once: what it exerts then less what MuJoCo lets it exert. p: half of the band in units of the command, share.
 static void servo_dead_band(const mjModel* m, mjData* d, const Term* term) {
@@ -20,7 +26,13 @@ static void servo_dead_band(const mjModel* m, mjData* d, const Term* term) {
     force = within(force, range[0], range[1]);
     less = within(less, range[0], range[1]);
   }
-  const int first = d->moment_rowadr[i], count = d->moment_rownnz[i];
-  for (int k = first; k < first + count; k++)
-    d->qfrc_passive[d->moment_colind[k]] += d->actuator_moment[k] * (less - force);
+  exerts_more(m, d, i, less - force);
+}
+
+// A drive whose force along its motion falls with its speed. p: one over its largest force, one over its speed without a load.
+static void torque_speed(const mjModel* m, mjData* d, const Term* term) {
+  const double *p = term->number, force = d->actuator_force[term->id], speed = d->actuator_velocity[term->id];
+  if (p[0] <= 0 || force * speed <= 0) return;
+  double limit = fmax(1 - fabs(speed) * p[1], 0) / p[0];
+  if (fabs(force) > limit) exerts_more(m, d, term->id, copysign(limit, force) - force);
 }

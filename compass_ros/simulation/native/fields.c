@@ -20,7 +20,7 @@ enum Kind {
   FRICTION_PATCH = 9, FRICTION_GRADIENT = 10, ANISOTROPIC = 11, STRIBECK = 12, COULOMB = 13, MAGNUS = 14, PULSATING = 15,
   RATE_RESTITUTION = 16, TANGENTIAL = 17, LIBRARY = 18, HAT = 19, TILT = 20, SPRING = 21,
   ASYMMETRIC = 22, LOAD_FRICTION = 23, COGGING = 24, GRAVITY_TILT = 25, WIND = 26, BUOYANCY = 27, SERVO_DEAD_BAND = 28,
-  ADHESION = 29, ROLLING = 30, PAIR_ATTRACTION = 31, TETHER = 32, WINDUP = 33,
+  ADHESION = 29, ROLLING = 30, PAIR_ATTRACTION = 31, TETHER = 32, WINDUP = 33, TORQUE_SPEED = 34,
 };
 
 // What the object is, and so where its forces go: a body that slides along x and y, the same with a hinge about z after
@@ -83,7 +83,7 @@ int compass_init(ApplyFT apply, FwdActuation actuation, Rne bias, SolveM solve, 
   is_sparse = sparse;
   island = islands;
   project = projects;
-  return WINDUP;
+  return TORQUE_SPEED;
 }
 
 // Gives a model its program. Returns 0 where it has one already, or where three quarters of the table are taken.
@@ -560,7 +560,7 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
 void compass_passive(const mjModel* m, mjData* d) {
   const Program* program = find(m);
   if (!program) return;
-  int holding = 0, changed = 0;
+  int holding = 0, changed = 0, driven = 0;
   for (int64_t i = 0; i < program->n; i++) {
     const Term* term = program->term + i;
     switch (term->kind) {
@@ -570,6 +570,10 @@ void compass_passive(const mjModel* m, mjData* d) {
       case ROLLING: rolling_resistance(m, d, term); break;
       case PAIR_ATTRACTION: case TETHER: between(m, d, term); break;
       case WINDUP: windup(m, d, term); break;
+      case TORQUE_SPEED:
+        if (!driven++) fwd_actuation(m, d);   // MuJoCo computes it after the passive forces
+        torque_speed(m, d, term);
+        break;
       case SERVO_DEAD_BAND: servo_dead_band(m, d, term); break;
       default:
         if (dry(term)) holding++;

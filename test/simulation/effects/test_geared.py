@@ -261,8 +261,21 @@ def test_cogging_repeats_with_the_angle(periods: float) -> None:
 def test_a_drive_pushes_no_harder_than_its_limit(actuator: str, told: float) -> None:
     """The tighter of the law's and of the scene's own."""
     limit = 0.3 if "forcerange" in actuator else 0.4
-    rate = moved(axis(actuator), laws(("torque_saturation", (1 / 0.4,), "a")), (0.0, 0.0), 0.1, told)[1]
+    rate = moved(axis(actuator), laws(("torque_saturation", (1 / 0.4, 0.0), "a")), (0.0, 0.0), 0.1, told)[1]
     assert rate == pytest.approx(np.sign(told) * 0.1 * limit / INERTIA, rel=1e-3)
+
+
+@pytest.mark.parametrize("actuator", ['<motor name="a" joint="axis"/>', '<velocity name="a" joint="axis" kv="9"/>'])
+@pytest.mark.parametrize("told", [9.0, -9.0])
+def test_a_motor_nears_its_speed_without_a_load_as_an_exponential(actuator: str, told: float) -> None:
+    """inertia v' = limit (1 - v / most); against its motion it pushes as hard as it can."""
+    limit, most, seconds = 0.4, 2.0, 0.3
+    law = laws(("torque_saturation", (1 / limit, 1 / most), "a"))
+    rate = moved(axis(actuator), law, (0.0, 0.0), seconds, told)[1]
+    expected = most * -np.expm1(-limit * seconds / (INERTIA * most))
+    assert rate == pytest.approx(np.sign(told) * expected, rel=5e-3)
+    braked = moved(axis(actuator), law, (0.0, -1.5 * np.sign(told)), 0.01, told)[1]
+    assert braked == pytest.approx(np.sign(told) * (0.01 * limit / INERTIA - 1.5), rel=1e-3)
 
 
 def servo(*numbers: float) -> Exported:

@@ -130,7 +130,7 @@ def test_sizes_are_those_of_the_scene_in_its_own_units(
         there = sized(other, name).effect.quantities
         for here, quantity in zip(sized(simulator, name).effect.quantities, there, strict=True):
             unit = in_units(here.unit, force, length)
-            if name == "torque_saturation":  # of a servo: one over its force
+            if here.name == "inverse_limit" and name == "torque_saturation":  # of a servo: one over its force
                 unit = 1 / (force * length)
             numbers = [(q.low, q.high, q.scale, q.start) for q in (here, quantity)]
             np.testing.assert_allclose(numbers[1], np.array(numbers[0]) * unit, rtol=0.02, err_msg=name)

@@ -29,8 +29,9 @@ NAMES = {
     "sensing": "camera_latency camera_scale camera_rotation lens_distortion rolling_shutter tracking_lag clock_drift "
     "latency scale offset rotation eccentricity",
 }
-TWICE = {"dead_band", "joint_elasticity", "stribeck_friction"}
-"""Laws with two hooks: a dead band by the kind of drive; of a gear and of a joint's friction the scene has springs."""
+TWICE = {"dead_band", "joint_elasticity", "stribeck_friction", "torque_saturation"}
+"""Laws with two hooks: a dead band by the kind of drive; of a gear and of a joint's friction the scene has springs, of a
+drive its limit."""
 SHOTS = np.vstack([DESCRIBED, WIDE[:1]])
 
 
