@@ -30,8 +30,8 @@ NAMES = {
     "latency scale offset rotation eccentricity",
 }
 TWICE = {"dead_band", "joint_elasticity", "stribeck_friction", "torque_saturation"}
-"""Laws with two hooks: a dead band by the kind of drive; of a gear and of a joint's friction the scene has springs, of a
-drive its limit."""
+"""Laws with two hooks: a dead band by the kind of drive; of a gear and of a joint's friction the scene has springs,
+of a drive its limit."""
 SHOTS = np.vstack([DESCRIBED, WIDE[:1]])
 
 
