@@ -125,14 +125,26 @@ def _as_probable_without(known: Known, model: Hypothesis, odds: float, laws: Seq
 
 
 def _unfinished(known: Known, others: Sequence[float]) -> str | None:
-    """The most probable model that holds a share of the probability and is not at its optimum; None: there is none."""
+    """The most probable model that is not at its optimum and holds a share of the probability; None: there is none.
+
+    The best one of all too, where a fit that leaves no more than the noise would make it better than all others are: it
+    is compared with a discrepancy, which needs no fit.
+    """
     total = known.total(others)
     rest, found = -np.inf, None
-    for name, (_, odds) in sorted(known.models.items(), key=lambda item: item[1][1]):
+    ordered = sorted(known.models.items(), key=lambda item: item[1][1])
+    for name, (model, odds) in ordered:
         rest = np.logaddexp(rest, odds)  # of this one and all less probable ones
-        if name not in known.finished and rest - total > log(SLIGHT):
+        could_be_best = name == ordered[-1][0] and odds + could_gain(model) > max(others)
+        if name not in known.finished and (rest - total > log(SLIGHT) or could_be_best):
             found = name
     return found
+
+
+def could_gain(model: Hypothesis) -> float:
+    """Log likelihood between a fit and one that leaves the noise and nothing else."""
+    likelihood = model.likelihood
+    return max(model.fit.point.cost - 0.5 * likelihood.measurements, 0.0) / likelihood.correlation_time
 
 
 def calls_for_more(model: Hypothesis, price: float) -> bool:

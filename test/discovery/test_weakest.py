@@ -39,6 +39,26 @@ def test_of_two_laws_that_do_the_same_one_stays() -> None:
     assert left.zero.weakest == ()
 
 
+@pytest.mark.parametrize(("share", "ended"), [(0.5, True), (2.0, False)])
+def test_a_fit_that_has_not_ended_is_not_worse_than_a_discrepancy(share: float, ended: bool) -> None:
+    """The best model is brought to its optimum before it is refuted, unless no fit could come up to the discrepancy: it
+    gains at most what it leaves above the noise."""
+    law = Attached(effect("viscous_drag"), PUCKS)
+    plain = response_of(recorded(law, [0.2]))
+    simulator, wider = widened(plain.simulator, plain.likelihood, [law])
+    everything = np.concatenate([plain.fit.free, np.arange(len(plain.likelihood.parameters), len(wider.parameters))])
+    begun = minimise(wider, start(wider, wider.prior_mean), everything, 0, 4.0)
+    model = Hypothesis((law,), simulator, wider, begun, without=plain.fit.linear.residual)
+    could = model.fit.point.cost - 0.5 * wider.measurements
+    assert could > 100
+    alone = Hypothesis((), plain.simulator, plain.likelihood, plain.fit).free.alone
+    known = Known(Prior.of(asked_of_table()), alone, {model.name: (model, 0.0)}, set())
+    finish(known, (share * could,))
+    assert (model.name in known.finished) is ended
+    if ended:
+        assert known.models[model.name][1] > share * could
+
+
 def test_a_wall_that_no_shot_touches_is_left_to_others() -> None:
     """Where nothing is shown, nothing is absent. Oracle: what another offset of a wall does to the recordings."""
     drag = Attached(effect("viscous_drag"), PUCKS)
