@@ -39,9 +39,10 @@ def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
 def _on_drive(size: DriveSize) -> tuple[Quantity, ...]:
     """Nothing happens before the limit is the largest force that was seen: a modest one cuts a tenth of that off. What
     was seen to move twice as fast as its drive does without a load was moved by something else."""
+    one, per = 1.0 / size.force, 1.0 / size.speed
     return (
-        Quantity("inverse_limit", "1", 0.0, 10.0 / size.force, 0.1 / size.force, begins=1.0 / size.force),
-        Quantity("inverse_speed", "1", 0.0, 2.0 / size.speed, 0.1 / size.speed, amplitude=False, later=True),
+        Quantity("inverse_limit", "1", 0.0, 10.0 * one, 0.1 * one, begins=one),
+        Quantity("inverse_speed", "1", 0.0, 2.0 * per, 0.1 * per, amplitude=False, start=0.5 * per, later=True),
     )
 
 
