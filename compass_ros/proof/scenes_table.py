@@ -18,7 +18,7 @@ def rows(found: Sequence[Line]) -> list[Row]:
     of = {kind: [x for x in found if kind_of(x) == kind] for kind in ("one", "two", "none", "outside")}
     clear = {kind: [x for x in among if not mark_of(x, "faint")] for kind, among in of.items()}
     sited = [x for x in of["one"] if mark_of(x, "sites_right") is not None]
-    pairs = [tuple(pair) for x in found for pair in marks_of(x).get("probabilities", ())]
+    pairs = [pair for x in found for pair in predictions(marks_of(x).get("probabilities", ()))]
     gains = [mark_of(x, "gain") for x in of["one"] + of["two"] if mark_of(x, "gain") is not None]
     seconds = [x["seconds"]["calibrate"] for x in found if x.get("seconds")]
     return [
@@ -41,6 +41,15 @@ def rows(found: Sequence[Line]) -> list[Row]:
 def _resolved(found: Sequence[Line]) -> list[bool]:
     """Of ambiguous verdicts that proposed what a world can play."""
     return [bool(x["next_experiment"]["resolved"]) for x in found if x.get("next_experiment")]
+
+
+def predictions(explanations: Sequence[tuple[float, bool]]) -> list[tuple[float, bool]]:
+    """Of one world, from the probability of each explanation and whether it is a right answer: that one of the right
+    answers is true is one prediction, and each other explanation is one."""
+    wrong = [(p, False) for p, right in explanations if not right]
+    if len(wrong) == len(explanations):
+        return wrong
+    return [(min(sum(p for p, right in explanations if right), 1.0), True), *wrong]
 
 
 def reliability(pairs: Sequence[tuple[float, bool]]) -> list[tuple[float, float, int]]:

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from compass_ros.proof.marks import judge
-from compass_ros.proof.scenes_table import reliability, rows
+from compass_ros.proof.scenes_table import predictions, reliability, rows
 
 
 def law(name: str, classes: list[str], strength: float = 5.0, sites: tuple[str, ...] = ("elbow",)) -> dict[str, Any]:
@@ -150,3 +150,9 @@ def test_probabilities_that_are_right_as_often_as_they_say_are_calibrated() -> N
     pairs = [(0.9, i < 9) for i in range(10)] + [(0.1, i < 1) for i in range(10)]
     assert all(abs(p - share) < 1e-12 for p, share, _ in reliability(pairs))
     assert reliability([(1.0, True)]) == [(1.0, 1.0, 1)]
+
+
+def test_of_several_right_answers_one_is_true() -> None:
+    """A faint law: `none` at 0.7 and its name at 0.2 are sure to 0.9, and neither of them is a wrong 0.3 or 0.8."""
+    assert predictions([(0.7, True), (0.2, True), (0.1, False)]) == [(pytest.approx(0.9), True), (0.1, False)]
+    assert predictions([(0.6, False), (0.4, False)]) == [(0.6, False), (0.4, False)]
