@@ -95,12 +95,12 @@ def weigh(
     tell("weigh effects", 0.95)
     said = Judge(found, held_out, noise, alpha, threshold, odds, undetectable(first), warnings).discovery()
     if said.mismatch.verdict == "none":
-        return replace(said, open_sigma=left_open(simulator, refined.fit, refined.among, held_out, seed))
+        return replace(said, open_sigma=left_open(simulator, refined.fit, refined.among, held_out, alpha, seed))
     if said.simulator is None:
         return said
     model = next(m for m in found.models if m.simulator is said.simulator)
     unseen = model.likelihood.on(held_out)
-    return replace(said, open_sigma=left_open(model.simulator, model.fit, model.among, unseen, seed))
+    return replace(said, open_sigma=left_open(model.simulator, model.fit, model.among, unseen, alpha, seed))
 
 
 def undetectable(first: list[Ranked]) -> tuple[str, ...]:

@@ -24,7 +24,7 @@ from compass_ros.types import Floats, Mismatch, Where
 
 TWICE = 2.0
 """Held-out error over noise floor from which what is left is not called noise."""
-DRAWS = 16
+MOST_DRAWS = 999
 """Of the parameters: a budget."""
 EVERYWHERE = Where("all", "all", "all")
 
@@ -47,27 +47,28 @@ def shown_noise(noise: Noise, likelihood: Likelihood, fit: Fit) -> Noise:
     return replace(noise, with_outliers=np.maximum(noise.rms, np.sqrt(noise.sigma**2 + more)))
 
 
-def left_open(simulator: Simulator, fit: Fit, among: Floats, held_out: Likelihood, seed: int) -> float:
+def left_open(simulator: Simulator, fit: Fit, among: Floats, held_out: Likelihood, alpha: float, seed: int) -> float:
     """How far [sigma, rms] predictions of held-out episodes may be off for the error bars of parameters and laws and
     for the time step, alone. `among`: covariance of what is free in the fit, in squares of the standard deviations of
     the prior.
 
-    The largest over some draws of the parameters, and of what the step does in each episode where things touch
-    (`nuisances`): a posterior predictive check (Gelman, Meng and Stern 1996), which a right model fails once in
-    DRAWS + 1 times where collisions amplify everything.
+    The largest over n draws of the parameters, and of what the step does in each episode where things touch
+    (`nuisances`): a posterior predictive check (Gelman, Meng and Stern 1996), which a right model fails once in n + 1
+    times where collisions amplify everything. So n + 1 is 1 / alpha: a false alarm here is one of the verdict's.
     """
+    draws = min(round(1 / alpha) - 1, MOST_DRAWS)
     rng = np.random.default_rng(seed)
     seen = ~np.isnan(held_out.measured)
     if not len(fit.free) or not seen.any():
         return 0.0
     still = np.zeros_like(held_out.inputs)
-    moves = rng.multivariate_normal(np.zeros(len(fit.free)), among, DRAWS, check_valid="ignore")
+    moves = rng.multivariate_normal(np.zeros(len(fit.free)), among, draws, check_valid="ignore")
     points = [Point(fit.point.values, still, np.inf), *(_moved(held_out, fit, move) for move in moves)]
     _, residuals = cost(held_out, points, fit.robust)
     off = residuals[1:] - residuals[0]
     if simulator.places.touching:
         step = finite_step(simulator, held_out, points[0], residuals[0])
-        off = off + rng.standard_normal((DRAWS, len(step), 1, 1)) * step
+        off = off + rng.standard_normal((draws, len(step), 1, 1)) * step
     return float(np.sqrt(np.mean(off[:, seen] ** 2, axis=1)).max())
 
 
