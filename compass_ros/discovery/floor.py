@@ -3,8 +3,8 @@
 `none` means that what is left is noise. An error in held-out episodes of TWICE the noise floor is three quarters
 something else in mean square, so it is never `none` beside it. It may be noise that neither stillness nor calm flight
 show (frames that are lost, stamps that are a little off, blur); then the floor is higher than it was taken for. Or
-something is missing for which no law stands. What the error bars of the parameters and the time step leave open there
-is no such error: a rebound from an edge that no parameter, and no step, is exact enough for.
+something is missing for which no law stands. What the error bars of the parameters and the engine's approximations
+leave open there is no such error: a rebound from an edge that no parameter, and no step, is exact enough for.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise, correlation_of
 from compass_ros.calibration.residuals import residual_at
-from compass_ros.discovery.nuisances import finite_step
+from compass_ros.discovery.nuisances import nuisances
 from compass_ros.simulation import Simulator
 from compass_ros.types import Floats, Mismatch, Where
 
@@ -49,12 +49,13 @@ def shown_noise(noise: Noise, likelihood: Likelihood, fit: Fit) -> Noise:
 
 def left_open(simulator: Simulator, fit: Fit, among: Floats, held_out: Likelihood, alpha: float, seed: int) -> float:
     """How far [sigma, rms] predictions of held-out episodes may be off for the error bars of parameters and laws and
-    for the time step, alone. `among`: covariance of what is free in the fit, in squares of the standard deviations of
-    the prior.
+    for what any model may be off by (`nuisances`), alone.
 
-    The largest over n draws of the parameters, and of what the step does in each episode where things touch
-    (`nuisances`): a posterior predictive check (Gelman, Meng and Stern 1996), which a right model fails once in n + 1
-    times where collisions amplify everything. So n + 1 is 1 / alpha: a false alarm here is one of the verdict's.
+    `among`: covariance of what is free in the fit, in squares of the standard deviations of the prior.
+
+    The largest over n draws of the parameters, of the nuisances, and of what the step does in each episode where things
+    touch: a posterior predictive check (Gelman, Meng and Stern 1996), which a right model fails once in n + 1 times
+    where collisions amplify everything. So n + 1 is 1 / alpha: a false alarm here is one of the verdict's.
     """
     draws = min(round(1 / alpha) - 1, MOST_DRAWS)
     rng = np.random.default_rng(seed)
@@ -65,10 +66,12 @@ def left_open(simulator: Simulator, fit: Fit, among: Floats, held_out: Likelihoo
     moves = rng.multivariate_normal(np.zeros(len(fit.free)), among, draws, check_valid="ignore")
     points = [Point(fit.point.values, still, np.inf), *(_moved(held_out, fit, move) for move in moves)]
     _, residuals = cost(held_out, points, fit.robust)
+    here = replace(fit, point=points[0], linear=replace(fit.linear, residual=residuals[0]))
+    engine = nuisances(simulator, held_out, here)
     off = residuals[1:] - residuals[0]
+    off = off + np.einsum("efcn,dn->defc", engine, rng.standard_normal((draws, engine.shape[3])))
     if simulator.places.touching:
-        step = finite_step(simulator, held_out, points[0], residuals[0])
-        off = off + rng.standard_normal((draws, len(step), 1, 1)) * step
+        off = off + rng.standard_normal((draws, len(engine), 1, 1)) * engine[..., 0]
     return float(np.sqrt(np.mean(off[:, seen] ** 2, axis=1)).max())
 
 
@@ -86,7 +89,7 @@ def honest(mismatch: Mismatch, error: float, floor: float, open_sigma: float = 0
         return mismatch
     times = f"{error / floor:.1f} times the noise"
     if error < TWICE * floor * np.hypot(1.0, open_sigma):
-        said = f"The held-out error is {times}, which error bars of the parameters and the time step leave open."
+        said = f"The held-out error is {times}, which error bars of the parameters and the numerics leave open."
         return replace(mismatch, sentence=f"{mismatch.sentence} {said}")
     if mismatch.verdict != "none":
         said = f"More is missing: the held-out error is still {times}, and no law of the library explains what is left."

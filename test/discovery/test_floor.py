@@ -13,8 +13,10 @@ from compass_ros.calibration.differences import Linear
 from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
-from compass_ros.discovery.floor import TWICE, honest, shown_noise
+from compass_ros.discovery.floor import TWICE, honest, left_open, shown_noise
+from compass_ros.discovery.nuisances import nuisances
 from compass_ros.types import Floats, Mismatch, Verdict
+from test.discovery.planted import recorded, response_of
 
 EPISODES, FRAMES, COLUMNS = 12, 150, 4
 ROBUST = 4.0
@@ -98,3 +100,19 @@ def test_what_the_error_bars_of_parameters_leave_open_is_no_error_of_the_model(
     assert beside.verdict == "named"
     assert ("More is missing" in beside.sentence) == (verdict == "unknown")
     assert f"{error:.1f} times the noise" in beside.sentence
+
+
+def test_what_is_left_open_has_the_error_bars_and_the_numerics_at_the_verdicts_alpha() -> None:
+    """Oracle: without error bars, the root mean square of normal draws of the nuisances of the evidence itself."""
+    response = response_of(recorded(None, []))
+    simulator, fit, likelihood = response.simulator, response.fit, response.likelihood
+    none, wide = np.zeros((len(fit.free),) * 2), 0.01 * np.eye(len(fit.free))
+    engine = nuisances(simulator, likelihood, fit)
+    once = [left_open(simulator, fit, none, likelihood, 0.5, seed) for seed in range(40)]
+    seen = ~np.isnan(likelihood.measured)
+    step = 1 + simulator.places.touching  # the first of them is one of each episode as well
+    expected = np.mean([step * engine[..., 0][seen] ** 2 + np.sum(engine[..., 1:][seen] ** 2, axis=1)])
+    assert np.mean(np.square(once)) == pytest.approx(expected, rel=0.5)
+    rare = left_open(simulator, fit, none, likelihood, 0.01, 0)
+    assert np.mean(once) < rare < 5 * np.mean(once)
+    assert left_open(simulator, fit, wide, likelihood, 0.01, 0) > 1.2 * rare
