@@ -105,6 +105,10 @@ def test_adhesion_is_seen_where_a_foot_sticks(tmp_path: Path) -> None:
     near_the_top(ranked(asked.foot(tmp_path), asked.lifts(6), "adhesion", pair, {"force": 10.0}), "adhesion", pair)
 
 
+FAINT = ("share", "hysteresis", "windup", "windup_force")
+"""Numbers of which such motions say little."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "on", "sizes"),
@@ -132,5 +136,5 @@ def test_such_a_law_is_named_with_its_site_and_its_numbers(
     (found,) = mismatch.explanations[0].laws
     assert (found.name, found.sites) == (law, tuple(on.split("+")))
     for name, quantity, number in zip(found.quantities, found.quantities.values(), planted, strict=True):
-        little = 2 * quantity.std if name in ("share", "hysteresis") else 0.0  # of these such motions say little
+        little = 2 * quantity.std if name in FAINT else 0.0
         assert quantity.value == pytest.approx(number, rel=0.05, abs=max(little, 0.0 if number else 0.01))
