@@ -35,13 +35,12 @@ def questions(result: Result) -> list[dict[str, Any]]:
     in_bars = in_error_bars(result)
     failed = VERDICT_LEVEL[result.mismatch.verdict] == "bad"
     names = dict.fromkeys(effect.name for effect in result.mismatch.effects)
+    edge = f"{'has' if len(active) == 1 else 'have'} an edge in the causal graph"
     return [
         {
             "question": "Which parameters?",
             "answer": f"{wrong if in_bars else len(active)} of {len(result.parameters)}",
-            "detail": f"were wrong; {len(active)} have an edge in the causal graph"
-            if in_bars
-            else "have an edge in the causal graph",
+            "detail": f"were wrong; {len(active)} {edge}" if in_bars else edge,
             "link": "causes",
         },
         {
