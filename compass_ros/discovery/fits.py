@@ -173,6 +173,18 @@ def without(model: Hypothesis, laws: Sequence[Attached]) -> Hypothesis:
     return Hypothesis(kept, simulator, likelihood, fit, without=model.bare)
 
 
+def in_common(model: Hypothesis, own: Sequence[Attached], shared: Attached) -> Hypothesis:
+    """The same model with one law on the sites of several, begun at the mean of their numbers."""
+    without_them, of_rest, at = lacking(model, own)
+    simulator, likelihood = widened(without_them, of_rest, [shared])
+    numbers = np.mean([model.fit.point.values[place] for attached, place in model.own() if attached in own], axis=0)
+    point = replace(model.fit.point, values=np.append(model.fit.point.values[at], numbers), cost=np.inf)
+    free = np.append(np.flatnonzero(np.isin(at, model.fit.free)), len(at) + np.arange(len(numbers)))
+    fit = minimise(likelihood, point, free, FEW, model.fit.robust, _LAST)
+    kept = tuple(attached for attached in model.laws if attached not in own)
+    return Hypothesis((*kept, shared), simulator, likelihood, fit, without=model.bare)
+
+
 def lacking(model: Hypothesis, laws: Sequence[Attached]) -> tuple[Simulator, Likelihood, Ints]:
     """Simulator and likelihood of a model without some of its laws, and the places of its values among the model's."""
     kept = [attached for attached in model.laws if attached not in laws]

@@ -10,7 +10,7 @@ import numpy as np
 from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.discrepancy import to_first_order
 from compass_ros.discovery.first_order import FirstOrder, Ranked
-from compass_ros.discovery.fits import Begun, from_parent, telling, whole
+from compass_ros.discovery.fits import Begun, from_parent, in_common, telling, whole
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.odds import Known, Prior, Weighed
 from compass_ros.discovery.race import first_of_each, race
@@ -95,6 +95,20 @@ def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str], u
             worth, price = max(odds, least), known.prior.of_laws
             better = [r for r in ranked if refuted or of_less + r.gain + price([r.candidate.name]) > worth]
             widen(known, less, better, unknown > 0)
+
+
+def join(known: Known, candidates: Sequence[Candidate]) -> None:
+    """Fit the best model with one law in common where it has the law alone on each of what moves in one plane."""
+    if not known.ordered:
+        return
+    best, moving = known.ordered[0][0], known.ordered[0][0].simulator.moving
+    for name in dict.fromkeys(a.effect.name for a in best.laws):
+        own = [a for a in best.laws if a.effect.name == name]
+        objects = {site for a in own for site in a.objects}
+        alike = (c for c in candidates if c.name == name and set(c.objects) == objects and not c.beside)
+        shared = next(alike, None)
+        if len(own) > 1 and shared is not None and not any(_separate(Candidate(a), moving) for a in own):
+            known.take([in_common(best, own, shared.attached)])
 
 
 def _deepest(known: Known) -> Hypothesis:

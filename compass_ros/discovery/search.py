@@ -18,7 +18,7 @@ from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.fits import finished
 from compass_ros.discovery.form import told_apart
 from compass_ros.discovery.hypothesis import Hypothesis
-from compass_ros.discovery.neighbours import exchange, rank, widen
+from compass_ros.discovery.neighbours import exchange, join, rank, widen
 from compass_ros.discovery.odds import Known, Prior
 from compass_ros.discovery.settings import PRIOR_UNKNOWN, RHO, RHO_PRIOR, SLIGHT
 from compass_ros.simulation.effects import Attached
@@ -69,6 +69,7 @@ def search(
         widen(known, best, ranked, found.unknown > 0)
         finish(known, others)
         exchange(known, candidates, widened, found.unknown, least)
+        join(known, candidates)
         finish(known, others)
         if not known.models:
             break  # nothing gains to first order, and no beginning calls for anything

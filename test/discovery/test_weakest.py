@@ -10,6 +10,7 @@ import pytest
 from compass_ros.calibration.cost import start
 from compass_ros.calibration.least_squares import minimise
 from compass_ros.discovery.hypothesis import Hypothesis, widened
+from compass_ros.discovery.neighbours import join
 from compass_ros.discovery.odds import Known, Prior
 from compass_ros.discovery.search import finish
 from compass_ros.discovery.zero import Zero
@@ -37,6 +38,25 @@ def test_of_two_laws_that_do_the_same_one_stays() -> None:
     ((left, _),) = known.models.values()
     assert len(left.laws) == 1
     assert left.zero.weakest == ()
+
+
+def test_what_slides_in_one_plane_has_a_law_in_common() -> None:
+    """A law that came to each puck by itself is one law with one size, where it is the same; and that costs less."""
+    laws = [Attached(effect("viscous_drag"), (puck,)) for puck in PUCKS]
+    plain = response_of(recorded(Attached(effect("viscous_drag"), PUCKS), [0.2]))
+    simulator, wider = widened(plain.simulator, plain.likelihood, laws)
+    everything = np.concatenate([plain.fit.free, np.arange(len(plain.likelihood.parameters), len(wider.parameters))])
+    fit = minimise(wider, start(wider, wider.prior_mean), everything, 20, 4.0)
+    each = Hypothesis(tuple(laws), simulator, wider, fit, without=plain.fit.linear.residual)
+    alone = Hypothesis((), plain.simulator, plain.likelihood, plain.fit).free.alone
+    prior = Prior.of(asked_of_table())
+    odds = each.log_evidence - alone + prior.of_laws(["viscous_drag"] * 2)
+    known = Known(prior, alone, {each.name: (each, odds)}, set())
+    join(known, asked_of_table())
+    (best, better), _ = known.ordered
+    assert [a.objects for a in best.laws] == [PUCKS]
+    assert better > odds
+    assert best.fit.point.values[-1] == pytest.approx(0.2, abs=3 * best.std[-1])
 
 
 @pytest.mark.parametrize(("share", "ended"), [(0.5, True), (2.0, False)])
