@@ -153,7 +153,7 @@ def _on_drives(effect: Effect, simulator: Simulator, visited: Visited) -> Iterat
             objects = () if drives == every and not effect.by_name else names_of(drives)
             if effect.on_drive is None or kind == "tool_drive":
                 sized: Effect = effect
-            elif (size := visited.drive_size(drives, effect.model is not None)).command > 0:
+            elif (size := visited.drive_size(drives)).command > 0:
                 sized = effect.at(size)
             else:
                 continue  # what was never told anything cannot show it

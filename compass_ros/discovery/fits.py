@@ -169,8 +169,7 @@ def without(model: Hypothesis, laws: Sequence[Attached]) -> Hypothesis:
     free = np.flatnonzero(np.isin(at, model.fit.free))
     linear = model.fit.linear.only(np.isin(model.fit.free, at))
     fit = minimise(likelihood, point, free, FEW, model.fit.robust, _LAST, linear)
-    kept = tuple(attached for attached in model.laws if attached not in laws)
-    return Hypothesis(kept, simulator, likelihood, fit, without=model.bare)
+    return Hypothesis(_kept(model, laws), simulator, likelihood, fit, without=model.bare)
 
 
 def in_common(model: Hypothesis, own: Sequence[Attached], shared: Attached) -> Hypothesis:
@@ -181,13 +180,12 @@ def in_common(model: Hypothesis, own: Sequence[Attached], shared: Attached) -> H
     point = replace(model.fit.point, values=np.append(model.fit.point.values[at], numbers), cost=np.inf)
     free = np.append(np.flatnonzero(np.isin(at, model.fit.free)), len(at) + np.arange(len(numbers)))
     fit = minimise(likelihood, point, free, FEW, model.fit.robust, _LAST)
-    kept = tuple(attached for attached in model.laws if attached not in own)
-    return Hypothesis((*kept, shared), simulator, likelihood, fit, without=model.bare)
+    return Hypothesis((*_kept(model, own), shared), simulator, likelihood, fit, without=model.bare)
 
 
 def lacking(model: Hypothesis, laws: Sequence[Attached]) -> tuple[Simulator, Likelihood, Ints]:
     """Simulator and likelihood of a model without some of its laws, and the places of its values among the model's."""
-    kept = [attached for attached in model.laws if attached not in laws]
+    kept = _kept(model, laws)
     numbers = [np.arange(own.start, own.stop) for attached, own in model.own() if attached in kept]
     cell = len(model.simulator.cell.parameters)
     at = np.concatenate([np.arange(cell), *numbers])
@@ -195,3 +193,8 @@ def lacking(model: Hypothesis, laws: Sequence[Attached]) -> tuple[Simulator, Lik
     of_all = model.likelihood
     prior = {"prior_mean": of_all.prior_mean[at], "prior_std": of_all.prior_std[at]}
     return simulator, replace(played(of_all, simulator), **prior), at
+
+
+def _kept(model: Hypothesis, laws: Sequence[Attached]) -> tuple[Attached, ...]:
+    """A model's laws but for some."""
+    return tuple(attached for attached in model.laws if attached not in laws)

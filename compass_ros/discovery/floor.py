@@ -13,19 +13,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from compass_ros.calibration.cost import Point, cost
+from compass_ros.calibration.cost import Point, cost, start
 from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise, correlation_of
 from compass_ros.calibration.residuals import residual_at
 from compass_ros.discovery.nuisances import nuisances
+from compass_ros.discovery.threshold import at_once
 from compass_ros.simulation import Simulator
 from compass_ros.types import Floats, Mismatch, Where
 
 TWICE = 2.0
 """Held-out error over noise floor from which what is left is not called noise."""
-MOST_DRAWS = 999
-"""Of the parameters: a budget."""
 EVERYWHERE = Where("all", "all", "all")
 
 
@@ -57,29 +56,29 @@ def left_open(simulator: Simulator, fit: Fit, among: Floats, held_out: Likelihoo
     touch: a posterior predictive check (Gelman, Meng and Stern 1996), which a right model fails once in n + 1 times
     where collisions amplify everything. So n + 1 is 1 / alpha: a false alarm here is one of the verdict's.
     """
-    draws = min(round(1 / alpha) - 1, MOST_DRAWS)
     rng = np.random.default_rng(seed)
     seen = ~np.isnan(held_out.measured)
     if not len(fit.free) or not seen.any():
         return 0.0
-    still = np.zeros_like(held_out.inputs)
-    moves = rng.multivariate_normal(np.zeros(len(fit.free)), among, draws, check_valid="ignore")
-    points = [Point(fit.point.values, still, np.inf), *(_moved(held_out, fit, move) for move in moves)]
-    _, residuals = cost(held_out, points, fit.robust)
-    here = replace(fit, point=points[0], linear=replace(fit.linear, residual=residuals[0]))
-    engine = nuisances(simulator, held_out, here)
-    off = residuals[1:] - residuals[0]
-    off = off + np.einsum("efcn,dn->defc", engine, rng.standard_normal((draws, engine.shape[3])))
-    if simulator.places.touching:
-        off = off + rng.standard_normal((draws, len(engine), 1, 1)) * engine[..., 0]
-    return float(np.sqrt(np.mean(off[:, seen] ** 2, axis=1)).max())
+    best = start(held_out, fit.point.values)
+    residual = residual_at(held_out, best)
+    engine = nuisances(simulator, held_out, replace(fit, point=best, linear=replace(fit.linear, residual=residual)))
+    largest = 0.0
+    for draws in at_once(round(1 / alpha) - 1):
+        moves = rng.multivariate_normal(np.zeros(len(fit.free)), among, draws, check_valid="ignore")
+        off = cost(held_out, [_moved(held_out, fit, move) for move in moves], fit.robust)[1] - residual
+        off = off + np.einsum("efcn,dn->defc", engine, rng.standard_normal((draws, engine.shape[3])))
+        if simulator.places.touching:
+            off = off + rng.standard_normal((draws, len(engine), 1, 1)) * engine[..., 0]
+        largest = max(largest, float(np.sqrt(np.mean(off[:, seen] ** 2, axis=1)).max()))
+    return largest
 
 
 def _moved(held_out: Likelihood, fit: Fit, move: Floats) -> Point:
     """(p,) standard deviations of the prior from a fit, within the bounds."""
     values = fit.point.values.copy()
     values[fit.free] += move * held_out.prior_std[fit.free]
-    return Point(np.clip(values, held_out.low, held_out.high), np.zeros_like(held_out.inputs), np.inf)
+    return start(held_out, np.clip(values, held_out.low, held_out.high))
 
 
 def honest(mismatch: Mismatch, error: float, floor: float, open_sigma: float = 0.0) -> Mismatch:

@@ -70,7 +70,5 @@ def at_noise(model: Hypothesis) -> bool:
 
 def left_over(model: Hypothesis) -> float:
     """What the laws of a model leave above the noise, as a share of what they change: rms of all that is measured."""
-    likelihood = model.likelihood
-    above = max(2 * model.fit.point.cost - likelihood.measurements, 0.0)
     changed = float(np.linalg.norm(model.bare - model.fit.linear.residual))
-    return float(np.sqrt(above)) / changed if changed > 0 else np.inf
+    return float(np.sqrt(model.above_noise)) / changed if changed > 0 else np.inf

@@ -55,6 +55,11 @@ class Hypothesis:
     def chi_square(self) -> float:
         return 2 * self.fit.point.cost / self.likelihood.measurements
 
+    @property
+    def above_noise(self) -> float:
+        """Squared residual above what noise alone leaves [sigma^2]."""
+        return max(2 * self.fit.point.cost - self.likelihood.measurements, 0.0)
+
     @cached_property
     def response(self) -> Response:
         return respond(self.simulator, self.likelihood, self.fit)

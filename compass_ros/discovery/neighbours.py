@@ -11,7 +11,7 @@ from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.discrepancy import to_first_order
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.fits import Begun, from_parent, in_common, telling, whole
-from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.hypothesis import Hypothesis, name_of
 from compass_ros.discovery.odds import Known, Prior, Weighed
 from compass_ros.discovery.race import first_of_each, race
 from compass_ros.discovery.scatter import ranked_scatter, with_scatter
@@ -99,16 +99,17 @@ def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str], u
 
 def join(known: Known, candidates: Sequence[Candidate]) -> None:
     """Fit the best model with one law in common where it has the law alone on each of what moves in one plane."""
-    if not known.ordered:
-        return
-    best, moving = known.ordered[0][0], known.ordered[0][0].simulator.moving
-    for name in dict.fromkeys(a.effect.name for a in best.laws):
-        own = [a for a in best.laws if a.effect.name == name]
-        objects = {site for a in own for site in a.objects}
-        alike = (c for c in candidates if c.name == name and set(c.objects) == objects and not c.beside)
-        shared = next(alike, None)
-        if len(own) > 1 and shared is not None and not any(_separate(Candidate(a), moving) for a in own):
-            known.take([in_common(best, own, shared.attached)])
+    tried = {*known.models, *known.finished}
+    for best, _ in known.ordered[:1]:
+        for name in dict.fromkeys(a.effect.name for a in best.laws):
+            own = [a for a in best.laws if a.effect.name == name]
+            if len(own) == 1 or any(_separate(Candidate(a), best.simulator.moving) for a in own):
+                continue
+            objects = {site for a in own for site in a.objects}
+            rest = [a for a in best.laws if a not in own]
+            shared = next((c.attached for c in candidates if c.name == name and set(c.objects) == objects), None)
+            if shared is not None and name_of([*rest, shared]) not in tried:
+                known.take([in_common(best, own, shared)])
 
 
 def _deepest(known: Known) -> Hypothesis:

@@ -136,16 +136,11 @@ def _unfinished(known: Known, others: Sequence[float]) -> str | None:
     ordered = sorted(known.models.items(), key=lambda item: item[1][1])
     for name, (model, odds) in ordered:
         rest = np.logaddexp(rest, odds)  # of this one and all less probable ones
-        could_be_best = name == ordered[-1][0] and odds + could_gain(model) > max(others)
+        could_gain = 0.5 * model.above_noise / model.likelihood.correlation_time
+        could_be_best = name == ordered[-1][0] and odds + could_gain > max(others)
         if name not in known.finished and (rest - total > log(SLIGHT) or could_be_best):
             found = name
     return found
-
-
-def could_gain(model: Hypothesis) -> float:
-    """Log likelihood between a fit and one that leaves the noise and nothing else."""
-    likelihood = model.likelihood
-    return max(model.fit.point.cost - 0.5 * likelihood.measurements, 0.0) / likelihood.correlation_time
 
 
 def calls_for_more(model: Hypothesis, price: float) -> bool:

@@ -36,11 +36,15 @@ def largest_odds(
 
     `priors`: log prior odds of each ranked law.
     """
-    rng, left = np.random.default_rng(seed), round(BEYOND / alpha)
-    counts = [min(AT_ONCE, left - begun) for begun in range(0, left, AT_ONCE)]
+    rng, counts = np.random.default_rng(seed), at_once(round(BEYOND / alpha))
     odds = np.concatenate([_largest_odds(response, ranked, priors, noise, rng, count) for count in counts])
     scatter = np.sqrt(2) * unsteady(response.likelihood, response.fit)
     return np.asarray(odds + scatter * np.random.default_rng(seed).standard_normal(len(odds)))
+
+
+def at_once(count: int) -> list[int]:
+    """Sizes of the parts in which so many are drawn."""
+    return [min(AT_ONCE, count - begun) for begun in range(0, count, AT_ONCE)]
 
 
 def _largest_odds(

@@ -102,16 +102,13 @@ class Visited:
         """(2, nu) the largest force and speed of each actuator."""
         return actuators_most(self._simulator.written(self._values), *self._states)
 
-    def drive_size(self, drives: Sequence[Site], pushed: bool = False) -> DriveSize:
-        """What drives of one kind are told.
-
-        `pushed`: with what their actuators exert and how fast they are there; without, both are taken for one.
-        """
+    def drive_size(self, drives: Sequence[Site]) -> DriveSize:
+        """What drives of one kind are told, and how hard and fast their actuators are there."""
         controls, steps = self._commands
         unit = command_unit(self._simulator.physics.model, drives[0])
         told = [np.linalg.norm(controls[:, :, list(d.actuators)], axis=2).max() for d in drives if controls is not None]
         own = [i for d in drives for i in d.actuators]
-        force, speed = (float(most) or 1.0 for most in (self._drives[:, own].max(axis=1) if pushed else (1.0, 1.0)))
+        force, speed = (float(most) or 1.0 for most in self._drives[:, own].max(axis=1))
         return DriveSize(drives[0].kind, float(max(told)), unit, force, steps * self._simulator.time_step, speed)
 
     @cached_property

@@ -34,7 +34,6 @@ _UNSAID: Mapping[Kind, str] = {
     Kind.TANGENTIAL: _NO_PLACE,
     Kind.ROLLING: _NO_PLACE,
     Kind.ADHESION: _NO_PLACE,
-    Kind.WINDUP: "a motor's joint of its own, not tried in MJX",
     Kind.TORQUE_SPEED: _REPLACES,
     Kind.SERVO_DEAD_BAND: _REPLACES,
 }

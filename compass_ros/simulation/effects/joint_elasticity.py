@@ -50,7 +50,7 @@ def _model(model: mujoco.MjModel, numbers: Floats, context: Context) -> None:
 def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
     if not numbers[:, 3].any():
         return ()
-    return tuple(Term(Kind.WINDUP, site, numbers[:, 3:5]) for site in context.sites)
+    return tuple(Term(Kind.WINDUP, site, numbers[:, :0]) for site in context.sites)  # the model has its numbers
 
 
 def _on_joint(size: JointSize) -> tuple[Quantity, ...]:

@@ -400,15 +400,14 @@ static void tangential_impulse(const mjModel* m, mjData* d, const Term* term) {
 #include "sliding.h"
 #include "drives.h"
 
-// How much softer a gear is about no twist (effects/joint_elasticity.py). p: windup, windup_force, -, -, the rotor's joint, and
-// the tendon between the two, which has the spring.
+// How much softer a gear is about no twist (effects/joint_elasticity.py). number[4]: the tendon between rotor and joint, which
+// has the spring: its actfrcrange is windup and windup_force.
 static void windup(const mjModel* m, mjData* d, const Term* term) {
-  const double* p = term->number;
-  int rotor = (int)p[4];
-  double stiffness = m->tendon_stiffness[(int)p[5]];
+  int tendon = (int)term->number[4], rotor = m->wrap_objid[m->tendon_adr[tendon]];
+  const mjtNum* p = m->tendon_actfrcrange + 2 * tendon;
+  double stiffness = m->tendon_stiffness[tendon];
   if (stiffness <= 0 || p[1] <= 0) return;
-  double twist = d->qpos[m->jnt_qposadr[rotor]] - d->qpos[m->jnt_qposadr[term->id]];
-  double back = p[0] * p[1] * tanh(stiffness * twist / p[1]);
+  double back = p[0] * p[1] * tanh(stiffness * d->ten_length[tendon] / p[1]);
   d->qfrc_passive[m->jnt_dofadr[rotor]] += back;
   d->qfrc_passive[term->dof] -= back;
 }

@@ -69,6 +69,13 @@ SLIDING = (Kind.STRIBECK, Kind.FRICTION_PATCH, Kind.FRICTION_GRADIENT, Kind.ANIS
 """Of a body in space these change the friction of its contacts (sliding.h); they are no force at its centre."""
 
 
+_BESIDE = {
+    Kind.STRIBECK: (mujoco.mjtObj.mjOBJ_JOINT, ANCHOR),
+    Kind.WINDUP: (mujoco.mjtObj.mjOBJ_TENDON, PREFIX),
+}
+"""What lies beside a joint (`cells/rotors.py`) and is a term's fifth number: kind of object, and prefix of its name."""
+
+
 class Placement(IntEnum):
     """Where a force goes: joints that slide along x and y (and turn about z), any moving body, a joint, an actuator, or
     both of two geoms or bodies."""
@@ -108,12 +115,9 @@ class Programs:
             if term.site is not None:
                 row["object"], row["id"], row["dof"] = _place(models[0], term.site)
             row["number"][:, : term.numbers.shape[1]] = term.numbers
-            if term.kind == Kind.STRIBECK and term.site is not None and term.site.kind in JOINTS:
-                row["number"][:, 4] = mujoco.mj_name2id(models[0], mujoco.mjtObj.mjOBJ_JOINT, ANCHOR + term.site.name)
-            elif term.kind == Kind.WINDUP and term.site is not None:
-                name = PREFIX + term.site.name
-                row["number"][:, 4] = mujoco.mj_name2id(models[0], mujoco.mjtObj.mjOBJ_JOINT, name)
-                row["number"][:, 5] = mujoco.mj_name2id(models[0], mujoco.mjtObj.mjOBJ_TENDON, name)
+            if term.kind in _BESIDE and term.site is not None and term.site.kind in JOINTS:
+                kind, prefix = _BESIDE[term.kind]
+                row["number"][:, 4] = mujoco.mj_name2id(models[0], kind, prefix + term.site.name)
         self._programs = np.zeros(len(models), _PROGRAM)
         self._programs["n"] = len(terms)
         self._programs["term"] = self._block.ctypes.data + self._block.strides[0] * np.arange(len(models))

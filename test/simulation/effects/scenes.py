@@ -11,7 +11,7 @@ from compass_ros.cells.dynamics import Sliding
 from compass_ros.simulation.effects import Attached, Exported, FittedEffect, attach, effect
 from compass_ros.types import Floats
 
-GRAVITY, CREEP = 9.81, 0.002
+GRAVITY, CREEP, INERTIA = 9.81, 0.002, 0.05
 Acceleration = Callable[[float, Floats, Floats], Floats]
 """(time, position, velocity) -> acceleration."""
 
@@ -49,6 +49,32 @@ def moved(model: mujoco.MjModel, given: Exported, position: Floats, velocity: Fl
     with attach(model, data, given):
         mujoco.mj_step(model, data, nstep=round(seconds / model.opt.timestep))
     return np.concatenate([data.qpos[: len(position)], data.qvel[: len(velocity)]])
+
+
+def axis(actuator: str = "", kind: str = "hinge", step: float = 1e-4) -> mujoco.MjModel:
+    """A joint of inertia (or mass) 0.05 without weight, and what drives it."""
+    return mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="{step}" gravity="0 0 0" integrator="implicitfast"/><worldbody><body>'
+        f'<joint name="axis" type="{kind}" axis="0 0 1"/><inertial pos="0 0 0" mass="0.05" diaginertia=".05 .05 .05"/>'
+        f"</body></worldbody><actuator>{actuator}</actuator></mujoco>"
+    )
+
+
+def laws(*given: tuple[str, tuple[float, ...], str]) -> Exported:
+    return Exported(tuple(FittedEffect(Attached(effect(n), (on,)), numbers, ()) for n, numbers, on in given), {})
+
+
+def swung(
+    model: mujoco.MjModel, given: Exported, start: tuple[float, float], seconds: float, told: float = 0.0
+) -> Floats:
+    """(2,) position and rate after some seconds."""
+    data = mujoco.MjData(model)
+    data.qpos[0], data.qvel[0] = start
+    if model.nu:
+        data.ctrl[0] = told
+    with attach(model, data, given):
+        mujoco.mj_step(model, data, nstep=round(seconds / model.opt.timestep))
+    return np.array([data.qpos[0], data.qvel[0]])
 
 
 def flown(acceleration: Acceleration, position: Floats, velocity: Floats, seconds: float, steps: int = 4000) -> Floats:

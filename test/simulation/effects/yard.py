@@ -107,7 +107,7 @@ def sized(simulator: Simulator, name: str) -> Attached:
         one, other = ((sizes[name], paths[name]) for name in sizes)
         return Attached(law.at(pair_size(site.kind, one, other)), objects)
     if law.on_drive is not None:
-        return Attached(law.at(visited.drive_size([site], pushed=True)), objects)
+        return Attached(law.at(visited.drive_size([site])), objects)
     if law.on_signal is not None:
         return Attached(law.at(signal_size(site, plain(simulator))), objects)
     return Attached(law, objects)
