@@ -131,8 +131,12 @@ def _fitted(entry: _Entry, path: Path | str) -> FittedEffect:
     found = {name: value.unit for name, value in values.items()}
     variants = _variants(entry, path)
     kind = next((v for v in variants if _units(v) == _later(v, found) | found), variants[0])
-    if (expected := _units(kind)) != _later(kind, found) | found:
-        raise ConfigError(f"{path}: {entry.name}: expected values with units {expected}, found {shown(found)}")
+    has = _later(kind, found) | found
+    if (expected := _units(kind)) != has:
+        wrong = shown({name: unit for name, unit in found.items() if expected.get(name) != unit})
+        absent = [name for name in expected if name not in has]
+        without = f", and no {', '.join(absent)}" if absent else ""
+        raise ConfigError(f"{path}: {entry.name}: expected values with units {expected}, found {wrong}{without}")
     given = [values.get(q.name, _Value(value=0.0, unit=q.unit)) for q in kind.quantities]
     std = tuple(float("nan") if v.std is None else v.std for v in given)
     return FittedEffect(Attached(kind, entry.objects), tuple(v.value for v in given), std)

@@ -60,7 +60,7 @@ def test_an_unknown_standard_deviation_stays_unknown(path: Path) -> None:
     [
         ("name: magnus", "name: magnet", "unknown effect 'magnet'.*did you mean 'magnus'"),
         ("unit: 1/s", "unit: rad/s", r"magnus: expected values with units \{'rate': '1/s'\}"),
-        ("rate:", "spin:", "expected values with units"),
+        ("rate:", "spin:", r"expected values with units .*found \{'spin': '1/s'\}, and no rate"),
         ("value: 0.3", "value: fast", r"effects\.0\.values\.rate\.value.*'fast'"),
         ("value: 0.3", "value: .inf", "finite"),
         ("effects:", "effect:", "effect"),
