@@ -65,6 +65,8 @@ class PairSize:
     """Mean [m]."""
     acceleration: float
     """The larger of theirs [m/s^2]."""
+    speed: float
+    """Root mean square of both together [m/s]."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +134,7 @@ def pair_size(kind: SiteKind, one: tuple[BodySize, Path], other: tuple[BodySize,
     apart = np.linalg.norm(of_b.position - of_a.position, axis=1)
     reduced = 1 / (1 / a.mass + 1 / b.mass)
     return PairSize(kind, reduced, min(a.extent, b.extent), float(apart.min()), float(apart.mean()),
-                    max(a.acceleration, b.acceleration))  # fmt: skip
+                    max(a.acceleration, b.acceleration), float(np.hypot(a.speed, b.speed)))  # fmt: skip
 
 
 def signal_size(site: Site, measured: Floats) -> SignalSize:
@@ -162,7 +164,7 @@ def unit_body(centred: bool = False, turns: bool = True) -> BodySize:
 
 def unit_pair(kind: SiteKind) -> PairSize:
     """The same of a pair."""
-    return PairSize(kind, *5 * [1.0])
+    return PairSize(kind, *6 * [1.0])
 
 
 def unit_sizes(kind: SiteKind) -> tuple[Size, ...]:
