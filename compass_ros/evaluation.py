@@ -68,7 +68,7 @@ def evaluate(cell: Cell, version: Path, episodes: Sequence[Episode], threads: in
     checked = check(cell, episodes)
     sound, without_motion = usable(cell, checked.episodes)
     data = recordings(cell, windows(cell, sound))
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
+    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
     gaps = {}
     for name, model in models.items():
         simulator = model.simulator.driven(data.drives)

@@ -72,7 +72,7 @@ def _calibrate(
     data = recordings(cell, unlike(cell, cut, config.windows) if cell.spec.windows else evenly(cut, config.episodes))
     judge = recordings(cell, evenly(windows(cell, held_out or fit), config.episodes)).numbered(len(data.names))
     simulator = simulator.driven(data.drives + judge.drives)
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
+    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
     posed = Posed(simulator, data, judge, noise)
     estimate, refined = estimate_parameters(posed.problem, config, steady.share(0.0, first))
     for _ in range(READ):

@@ -131,7 +131,7 @@ def regression(cell: Cell, episodes: list[Episode], config: CalibrationConfig, c
 def judged(cell: Cell, episodes: list[Episode], values: Floats | None = None) -> Mapping[str, SignalGap]:
     """How far the cell is from recordings at (P,) values, or at its defaults; each window begins where it fits best."""
     data = recordings(cell, windows(cell, episodes))
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
+    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
     driven = Simulator(cell).driven(data.drives)
     chosen = driven.defaults if values is None else values
     return launched(driven, data, noise, chosen).gap(chosen, noise.rms).signals

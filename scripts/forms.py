@@ -100,7 +100,7 @@ def calibrated(cell: Cell, episodes: Sequence[Episode]) -> tuple[Hypothesis, Sim
     data = recordings(cell, unlike(cell, cut, config.windows) if cell.spec.windows else evenly(cut, config.episodes))
     judge = recordings(cell, windows(cell, held_out)).numbered(len(data.names))
     simulator = Simulator(cell, threads=1).driven(data.drives + judge.drives)
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
+    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
     posed = Posed(simulator, data, judge, noise)
     estimate, refined = estimate_parameters(posed.problem, config, silent)
     done: Refined = refined or refine(posed.problem.likelihood, estimate.values)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtri
 
 from compass_ros.calibration.encoder import ROOT_12, encoder_step, repeats
+from compass_ros.calibration.in_common import of_its_own
 from compass_ros.types import Bools, Floats
+
+Bodies = Sequence[Sequence[int]]
 
 MOST_CORRELATED = 0.98
 """Beyond it, a residual says nothing of how often it was measured."""
@@ -109,15 +113,19 @@ def correlated(white: Floats, correlation: float) -> Floats:
     return out
 
 
-def measure_noise(time_s: Floats, measured: Floats, expected: float, stated: Floats | None = None) -> Noise:
+def measure_noise(
+    time_s: Floats, measured: Floats, expected: float, stated: Floats | None = None, bodies: Bodies = ()
+) -> Noise:
     """From (E, F) times since the command and (E, F, C) measurements; `expected` [m] where neither can be measured.
+
+    `bodies`: columns of the place of each that one camera sees: what they have in common is no noise (`in_common`).
 
     `stated`: (C,) what the sensor says of itself. It knows of errors that do not change from frame to frame, which no
     scatter shows, so the larger of both counts; and so with an encoder's rounding, which stillness does not show.
     """
     least = LEAST_SHARE * expected
     step = np.array([encoder_step(list(column), ROOT_12 * least) for column in measured.transpose(2, 0, 1)])
-    sigma, beyond, correlation = _scatter(time_s, measured, expected, least)
+    sigma, beyond, correlation = _scatter(time_s, measured, bodies, expected, least)
     with_outliers = np.hypot(sigma, beyond)
     sigma = np.maximum(sigma, np.maximum(step / ROOT_12, least))
     systematic = None
@@ -127,15 +135,18 @@ def measure_noise(time_s: Floats, measured: Floats, expected: float, stated: Flo
     return Noise(sigma, correlation, step if step.any() else None, with_outliers, systematic)
 
 
-def _scatter(time_s: Floats, measured: Floats, expected: float, least: float) -> tuple[Floats, Floats, float]:
+def _scatter(
+    time_s: Floats, measured: Floats, bodies: Bodies, expected: float, least: float
+) -> tuple[Floats, Floats, float]:
     """(C,) standard deviation, (C,) rms of what is beyond the outliers' limit, correlation of neighbours."""
     still = _still_residuals(time_s, measured)
     if still is None:
-        flight, beyond, _ = _flight_noise(measured)
+        flight, beyond, _ = _flight_noise(measured, bodies)
         return np.where(np.isnan(flight), expected, flight), beyond, 0.0
+    still = of_its_own(still, bodies, _at_rest(still)[1])
     at_rest, correlation = _at_rest(still)
     repeated = correlation_time(correlation)
-    flight, beyond, of_flight = _flight_noise(np.where(time_s[:, :, None] < 0, np.nan, measured))
+    flight, beyond, of_flight = _flight_noise(np.where(time_s[:, :, None] < 0, np.nan, measured), bodies)
     beyond = np.fmax(beyond, np.sqrt(np.nanmean(np.square(still) - np.square(_clipped(still)), axis=(0, 1))))
     if correlation > _FOLLOWS:
         of_flight = np.zeros_like(of_flight)
@@ -191,7 +202,7 @@ def _clipped(still: Floats) -> Floats:
     return np.asarray(np.clip(still, -limit, limit))
 
 
-def _flight_noise(measured: Floats) -> tuple[Floats, Floats, Floats]:
+def _flight_noise(measured: Floats, bodies: Bodies) -> tuple[Floats, Floats, Floats]:
     """(C,) standard deviation by the middle of seven frames against the parabola through the others; (C,) the rms of
     what is beyond the outliers' limit, (C,) the freedom of the first.
 
@@ -212,12 +223,14 @@ def _flight_noise(measured: Floats) -> tuple[Floats, Floats, Floats]:
     deviation = windows[..., half] - around @ weights
     rough = np.sum((around - around @ (design @ np.linalg.pinv(design)).T) ** 2, axis=-1)
     out, beyond, freedom = np.full(columns, np.nan), np.zeros(columns), np.zeros(columns)
+    seen = ~np.isnan(rough) & ~np.isnan(deviation)
+    calm = seen & (rough <= np.nanmedian(np.where(seen, rough, np.nan), axis=(0, 1)))
+    without_contacts = _clipped(deviation)
+    deviation += of_its_own(without_contacts, bodies, apart=_WINDOW) - without_contacts
     for c in range(columns):
-        seen = ~np.isnan(rough[..., c]) & ~np.isnan(deviation[..., c])
-        if not seen.any():
+        chosen = deviation[..., c][calm[..., c] & ~np.isnan(deviation[..., c])]
+        if not len(chosen):
             continue
-        calm = seen & (rough[..., c] <= np.median(rough[..., c][seen]))
-        chosen = deviation[..., c][calm]
         limit = 3.5 * 1.4826 * np.median(np.abs(chosen))
         drawn_in = np.clip(chosen, -limit, limit)
         out[c] = np.sqrt(np.mean(drawn_in**2) / (1 + np.sum(weights**2)))

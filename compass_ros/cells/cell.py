@@ -135,6 +135,12 @@ class Cell:
         return tuple(s.name for s in self.signals for _ in range(s.size))
 
     @cached_property
+    def filmed(self) -> tuple[tuple[int, ...], ...]:
+        """Columns of where each body is that a camera sees [m]: x and y, or x, y and z."""
+        seen = [s for s in self.signals if s.places and not s.jointed]
+        return tuple(tuple(range(s.first, s.first + s.size))[:3] for s in seen)
+
+    @cached_property
     def fitted(self) -> Bools:
         """(C,) whether a column is of what parameters are fitted to."""
         return np.concatenate([np.full(s.size, s.fitted) for s in self.signals])

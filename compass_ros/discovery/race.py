@@ -122,10 +122,8 @@ def _runner(
     return growing(likelihood, values, held, begun, horizons)
 
 
-def _of_a_size(
-    likelihood: Likelihood, values: Floats, new: Ints, laws: Sequence[Attached], robust: float
-) -> Floats:
-    """(P,) values with the amplitudes of the laws that begin a share of their sizes from nothing, the best of SHARES."""
+def _of_a_size(likelihood: Likelihood, values: Floats, new: Ints, laws: Sequence[Attached], robust: float) -> Floats:
+    """(P,) values with the amplitudes of the new laws at the best of SHARES of their sizes."""
     quantities = [q for attached in laws for q in attached.effect.quantities]
     begins = np.array([q.begins if q.amplitude else n for q, n in zip(quantities, values[new], strict=True)])
     starts = [start(likelihood, values)]

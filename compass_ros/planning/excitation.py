@@ -107,7 +107,7 @@ def _likelihood(simulator: Simulator, episodes: Sequence[Episode], most: int) ->
     every = windows(cell, episodes)
     chosen = np.unique(np.round(np.linspace(0, len(every) - 1, min(len(every), most))).astype(int))
     data = recordings(cell, [every[i] for i in chosen])
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
+    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
     return pose(simulator.driven(data.drives), data, noise).likelihood, len(chosen) / len(every)
 
 

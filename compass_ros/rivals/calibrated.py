@@ -70,7 +70,7 @@ def problems(
         raise DataError(f"{len(episodes)} episodes and a held-out share of {config.held_out_share:g}: none is held out")
     simulator = Simulator(cell, threads=config.threads)
     data, judge = recordings(cell, fit), recordings(cell, held_out)
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
+    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
     return simulator, pose(simulator, data, noise), data, judge, noise
 
 

@@ -90,3 +90,35 @@ def test_what_is_slow_beside_white_noise_counts_over_all_lags(slow: float, corre
         times.append(integrated_correlation_time(np.where(seen, residual, 99.0), seen))
     expected = (1 + slow * (1 + correlation) / (1 - correlation)) / (1 + slow)
     assert np.mean(times) == pytest.approx(expected, rel=0.1)
+
+
+BODIES = ((0, 1), (2, 3))
+
+
+def swaying(time: Floats, size: float, frequency: float) -> Floats:
+    """(E, F, 4) of a camera's mast over two bodies; episodes begin at any phase of it."""
+    phase = np.random.default_rng(3).uniform(0, 6.28, (EPISODES, 1))
+    swing = size * np.sin(2 * np.pi * frequency * time + phase)
+    return np.stack([0.4 * swing, swing, 0.4 * swing, swing], axis=2)
+
+
+@pytest.mark.parametrize("still", [0, 20])
+@pytest.mark.parametrize("frequency", [3.5, 11.0])
+def test_what_two_bodies_do_together_is_no_noise_of_theirs(frequency: float, still: int) -> None:
+    time, measured = recording(np.full(4, 1e-3), still=still)
+    measured += swaying(time, 7e-3, frequency)
+    found = measure_noise(time, measured, 0.02, bodies=BODIES)
+    apart = measure_noise(time, measured, 0.02)
+    assert np.all(found.sigma < 1.5e-3)  # a body's noise and that of the one it is compared with
+    assert found.correlation < 0.3
+    assert apart.sigma.max() > 2e-3 or still == 0  # in flight a slow sway is motion, not noise
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.9])
+def test_bodies_with_noise_of_their_own_have_nothing_in_common(correlation: float) -> None:
+    """Two AR(1) processes of 20 frames seem to correlate; what is new in each frame does not."""
+    for seed in range(30):
+        given = recording(np.full(4, 1e-3), correlation, still=20, seed=seed)
+        np.testing.assert_array_equal(
+            measure_noise(*given, 0.02, bodies=BODIES).sigma, measure_noise(*given, 0.02).sigma
+        )

@@ -32,7 +32,7 @@ def held(tmp_path_factory: pytest.TempPathFactory) -> Response:
         Simulator(cell, laws, threads=1), [*truth, 0.2, 0.6, 0.2], np.stack([goals, goals], 1), 1.2, NOISE, 0
     )
     simulator, data = Simulator(cell, threads=1), recordings(cell, episodes)
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
+    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
     likelihood = pose(simulator, data, noise).likelihood
     fit = minimise(likelihood, start(likelihood, truth), np.arange(2), 10, 4.0)
     return respond(simulator, likelihood, fit)

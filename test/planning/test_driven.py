@@ -116,7 +116,7 @@ def test_what_is_played_keeps_to_the_limits_and_is_read_again(name: str, tmp_pat
 def errors_of_a_fit(cell: Cell, episodes: list[Episode]) -> Floats:
     """(P,) standard errors of a real fit, in prior widths."""
     data = recordings(cell, windows(cell, episodes))
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
+    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
     likelihood = pose(Simulator(cell).driven(data.drives), data, noise).likelihood
     refined = refine(likelihood, likelihood.prior_mean)
     out = np.ones(len(cell.parameters))

@@ -56,7 +56,7 @@ def slow(cell: Cell, law: Attached, values: Floats) -> list[Episode]:
 
 def fitted(cell: Cell, episodes: list[Episode], laws: tuple[Attached, ...]) -> Hypothesis:
     data = recordings(cell, windows(cell, episodes))
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
+    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
     plain = Simulator(cell, threads=1).driven(data.drives)
     likelihood: Likelihood = pose(plain, data, noise).likelihood
     simulator, wider = widened(plain, likelihood, laws)

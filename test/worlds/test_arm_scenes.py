@@ -164,7 +164,7 @@ def test_the_cell_at_the_true_values_plays_the_same_motion(
     assert isinstance(truth, dict)
     values = np.array([truth[p.name] + (later if p.name.endswith("delay") else 0) for p in cell.parameters])
     data = recordings(cell, windows(cell, list(made.episodes[:4])))
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
+    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
     gap = launched(Simulator(cell, threads=1).driven(data.drives), data, noise, values).gap(values, noise.rms)
     for signal, bound in most.items():
         found = gap.signals[signal]
