@@ -81,9 +81,10 @@ class Known:
                 self.models[model.name] = (model, odds)
 
     def without(self, model: Hypothesis, laws: Sequence[Attached]) -> Weighed | None:
-        """A model without some of its laws, fitted if it is not known; None: another of its laws is zero then."""
+        """A model without some of its laws, fitted if it is not known, or was not from as near its optimum as the model
+        is; None: another of its laws is zero then."""
         name = name_of([a for a in model.laws if a not in laws])
-        if name not in self.models:
+        if name not in self.models or model.name in self.finished:
             self.take([without(model, laws)])
         return self.models.get(name)
 

@@ -118,11 +118,12 @@ def finish(known: Known, others: Sequence[float]) -> None:
 
 
 def _as_probable_without(known: Known, model: Hypothesis, odds: float, laws: Sequence[Attached]) -> bool:
-    """Whether a model without some of its laws is as probable; not where that leaves none, or these are none."""
+    """Whether a model without some of its laws is as probable, or the same one; not where that leaves none, or these
+    are none."""
     if not 0 < len(laws) < len(model.laws):
         return False
     less = known.without(model, laws)
-    return less is not None and less[1] >= odds
+    return less is not None and (less[1] >= odds or model.zero.nothing(laws))
 
 
 def _unfinished(known: Known, others: Sequence[float]) -> str | None:

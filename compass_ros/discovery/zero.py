@@ -54,6 +54,10 @@ class Zero:
         order = noise.nearest_first(laws)
         return next((tuple(order[:n]) for n in range(len(order), 0, -1) if noise.may_lack(order[:n])), ())
 
+    def nothing(self, laws: Sequence[Attached]) -> bool:
+        """Whether the fit has all amplitudes of some laws at zero: it is that of the model without them."""
+        return all(not np.any(self.away[own]) for a, own in self.laws if a in laws)
+
     def shown(self, law: Attached) -> bool:
         """Whether the recordings say more of its amplitudes than the prior does, for the most part."""
         return any(a is law and bool(np.all(self.told[own] > 0.5)) for a, own in self.laws)
