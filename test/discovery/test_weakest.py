@@ -59,6 +59,30 @@ def test_what_slides_in_one_plane_has_a_law_in_common() -> None:
     assert best.fit.point.values[-1] == pytest.approx(0.2, abs=3 * best.std[-1])
 
 
+def test_a_model_with_a_site_less_is_fitted_from_the_optimum_of_the_other() -> None:
+    """Beside a fit that had not ended, a site that is at zero seemed to be worth a lot (air_hockey 1020002)."""
+    laws = [Attached(effect("viscous_drag"), (puck,)) for puck in PUCKS]
+    plain = response_of(recorded(laws[0], [0.2]))
+    simulator, wider = widened(plain.simulator, plain.likelihood, laws)
+    cells = len(plain.likelihood.parameters)
+    everything = np.concatenate([plain.fit.free, cells + np.arange(2)])
+    fit = minimise(wider, start(wider, wider.prior_mean), everything, 20, 4.0)
+    each = Hypothesis(tuple(laws), simulator, wider, fit, without=plain.fit.linear.residual)
+    one, of_one = widened(plain.simulator, plain.likelihood, laws[:1])
+    begun = minimise(of_one, start(of_one, of_one.prior_mean), everything[:-1], 0, 4.0)
+    less = Hypothesis((laws[0],), one, of_one, begun, without=plain.fit.linear.residual)
+    alone = Hypothesis((), plain.simulator, plain.likelihood, plain.fit).free.alone
+    known = Known(Prior.of(asked_of_table()), alone, {each.name: (each, 500.0), less.name: (less, -500.0)}, set())
+    finish(known, (0.0,))
+    assert [model.laws for model, _ in known.ordered] == [(laws[0],)]
+    assert known.ordered[0][1] > 0
+
+
+def test_a_site_at_zero_is_none_whatever_its_error_bars() -> None:
+    own, zero = sites([5.0, 0.0, 1e-3], np.eye(3))
+    assert [zero.nothing([a]) for a in own] == [False, True, False]
+
+
 @pytest.mark.parametrize(("share", "ended"), [(0.5, True), (2.0, False)])
 def test_a_fit_that_has_not_ended_is_not_worse_than_a_discrepancy(share: float, ended: bool) -> None:
     """The best model is brought to its optimum before it is refuted, unless no fit could come up to the discrepancy: it
