@@ -109,14 +109,16 @@ def _seen(likelihood: Likelihood, point: Point, residual: Floats, launch: Floats
     return launch
 
 
-def extended(old: Linear, likelihood: Likelihood, point: Point, residual: Floats, free: Ints) -> Linear:
+def extended(
+    old: Linear, likelihood: Likelihood, point: Point, residual: Floats, free: Ints, steps: Floats | None = None
+) -> Linear:
     """Differences that are known of the first of the `free` parameters, with those of the others taken at a point.
 
-    `residual`: (E, F, C) there.
+    `residual`: (E, F, C) there. `steps`: (p,) as in `linearise`, where they are known.
     """
-    new = free[old.jacobian.shape[-1] :]
-    episodes = len(likelihood.inputs)
-    steps = inward(likelihood, point, new, np.full(len(new), FIRST_STEP))
+    known, episodes = old.jacobian.shape[-1], len(likelihood.inputs)
+    new = free[known:]
+    steps = inward(likelihood, point, new, np.full(len(new), FIRST_STEP) if steps is None else steps[known:])
     values = np.tile(point.values, (len(new), 1))
     values[np.arange(len(new)), new] += steps
     index = np.tile(np.arange(episodes), len(new))

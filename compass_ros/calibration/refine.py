@@ -178,12 +178,14 @@ def growing(
     held: Ints = NONE,
     begun: Strongest | None = None,
     horizons: tuple[float, ...] = (),
+    linear: Linear | None = None,
 ) -> Iterator[tuple[Likelihood, Fit]]:
     """The beginning of each episode and the fit of the strongest parameters to it, longer from one to the next.
 
     Those `held` stay as they are until whole episodes are fitted: a beginning of half a second says nothing of a
     frequency. `begun`: the strongest ones, where they are known. `horizons`: other shares of the episodes than all that
-    the likelihood has.
+    the likelihood has. `linear`: differences of the strongest near the values, to the first horizon, where these are
+    known.
     """
     point = start(likelihood, values)
     begun = begun or strongest(likelihood, values)
@@ -194,9 +196,9 @@ def growing(
         last = share == likelihood.horizons[-1]
         tolerance = 1.0 if last else 5.0
         if last and len(begun.which) > len(strong):
-            strong, onset = begun.which, None
-        fit = minimise(part, point, strong, 4, robust, tolerance, steps=steps[strong], fresh=last, onset=onset)
-        point, steps[strong], onset = fit.point, difference_steps(fit.linear), fit.linear.onset
+            strong, onset, linear = begun.which, None, None
+        fit = minimise(part, point, strong, 4, robust, tolerance, linear, last, steps[strong], onset)
+        point, steps[strong], onset, linear = fit.point, difference_steps(fit.linear), fit.linear.onset, None
         yield part, fit
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import log
 from typing import TypeVar
 
 import numpy as np
 
 from compass_ros.calibration.cost import Point, cost, start
-from compass_ros.calibration.differences import difference_steps
+from compass_ros.calibration.differences import Linear, difference_steps, extended, linearise
 from compass_ros.calibration.least_squares import Fit, minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import Strongest, growing, strongest
@@ -27,7 +27,7 @@ from compass_ros.types import Floats, Ints
 Runner = TypeVar("Runner")
 ETA = 3
 """One in so many goes on (Li et al. 2018, Hyperband: 3 or 4)."""
-SHARES = (0.3, 0.1, -0.1, -0.3, -1.0)
+SHARES = (1.0, 0.3, 0.1, -0.1, -0.3, -1.0)
 """Of a modest size at which a law may begin: four steps of Gauss-Newton do not come back from one that is ten times too
 large, or of the wrong sign, in contacts (bouncing_ball 1010001: a slope of 0.5 s/m where -0.047 is best)."""
 
@@ -43,11 +43,11 @@ def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats
     """
     if not starts:
         return []
-    values, begun, horizons = _unbent(parent, rows)
-    if not horizons:
+    unbent = _unbent(parent, rows)
+    if unbent is None:
         return []  # a fit to all of these episodes calls for nothing
-    runners = [_runner(parent, laws, np.append(values, numbers), rows, begun, horizons)
-               for laws, numbers in starts]  # fmt: skip
+    horizons = unbent.horizons
+    runners = [_runner(parent, laws, numbers, rows, unbent) for laws, numbers in starts]
     alive = list(range(len(runners)))
     found: dict[int, tuple[Likelihood, Fit]] = {}
     for _ in horizons:
@@ -84,55 +84,70 @@ def _at_the_end(parent: Hypothesis, laws: tuple[Attached, ...], likelihood: Like
     return Begun(laws, replace(point, cost=float(cost(likelihood, [point], parent.fit.robust)[0][0])), bent=False)
 
 
-def _unbent(parent: Hypothesis, rows: Ints) -> tuple[Floats, Strongest, tuple[float, ...]]:
-    """(P,) the parent's model fitted to the longest horizon that calls for nothing more, and the longer ones.
+@dataclass(frozen=True, eq=False)
+class _Unbent:
+    """A model fitted to the longest horizon that calls for nothing more."""
+
+    values: Floats
+    """(P,)."""
+    strong: Strongest
+    horizons: tuple[float, ...]
+    """The longer ones."""
+    linear: Linear
+    """Differences there of the strongest, to the first of these."""
+
+
+def _unbent(parent: Hypothesis, rows: Ints) -> _Unbent | None:
+    """The parent's model, from the cell's first guess on. None: the longest horizon calls for nothing.
 
     With all that is free in it, to the end: what a fit still lacks, a discrepancy seems to be called for.
     """
     likelihood, first = parent.likelihood.of(rows), len(parent.simulator.cell.parameters)
     values = parent.likelihood.prior_mean.copy()
     values[first:] = parent.fit.point.values[first:]
-    begun, held = strongest(likelihood, values), first + shapes(parent.laws)
+    strong, held = strongest(likelihood, values), first + shapes(parent.laws)
     horizons, steps = likelihood.horizons, difference_steps(parent.fit.linear)
-    for k, (part, rough) in enumerate(growing(likelihood, values, held, begun)):
+    for k, (part, rough) in enumerate(growing(likelihood, values, held, strong)):
         fit = minimise(part, rough.point, parent.fit.free, 2 * FEW, parent.fit.robust, 1.0, steps=steps, fresh=False)
         found = free(respond(parent.simulator, part, fit))
         if found.log + PRIOR_UNKNOWN > found.alone:
-            return values, begun, horizons[k:]
+            which = np.setdiff1d(strong.which, held)
+            linear = linearise(part, start(part, values), which, strong.steps[which])
+            return _Unbent(values, strong, horizons[k:], linear)
         values = fit.point.values
-    return values, begun, ()
+    return None
 
 
 def _runner(
-    parent: Hypothesis,
-    laws: Sequence[Attached],
-    values: Floats,
-    rows: Ints,
-    begun: Strongest,
-    horizons: tuple[float, ...],
+    parent: Hypothesis, laws: Sequence[Attached], numbers: Floats, rows: Ints, unbent: _Unbent
 ) -> Iterator[tuple[Likelihood, Fit]]:
-    """Fits of one model to some episodes, longer from one to the next; shapes stay as they are until the last."""
-    simulator, likelihood = widened(parent.simulator, parent.likelihood, laws)
-    new = np.arange(len(parent.fit.point.values), len(values))
+    """Fits of one model to some episodes, longer from one to the next; shapes stay as they are until the last. Near
+    where nothing is bent its parent's differences hold."""
+    simulator, likelihood = widened(parent.simulator, parent.likelihood.of(rows), laws)
+    first = likelihood.until(unbent.horizons[0] * float(likelihood.time_s.max()))
+    values, residual, steps = _of_a_size(first, unbent.values, laws, numbers, parent.fit.robust)
+    new = np.arange(len(unbent.values), len(values))
     held = len(simulator.cell.parameters) + shapes((*parent.laws, *laws))
-    likelihood = likelihood.of(rows)
-    first = likelihood.until(horizons[0] * float(likelihood.time_s.max()))
-    values = _of_a_size(first, values, new, laws, parent.fit.robust)
-    begun = begun.beside(values, new, np.full(len(new), 1 / WIDTH))
-    return growing(likelihood, values, held, begun, horizons)
+    strong = unbent.strong.beside(values, new, steps)
+    which = np.setdiff1d(strong.which, held)
+    linear = extended(unbent.linear, first, start(first, values), residual, which, strong.steps[which])
+    return growing(likelihood, values, held, strong, unbent.horizons, linear)
 
 
-def _of_a_size(likelihood: Likelihood, values: Floats, new: Ints, laws: Sequence[Attached], robust: float) -> Floats:
-    """(P,) values with the amplitudes of the new laws at the best of SHARES of their sizes."""
+def _of_a_size(
+    likelihood: Likelihood, values: Floats, laws: Sequence[Attached], numbers: Floats, robust: float
+) -> tuple[Floats, Floats, Floats]:
+    """(P + q,) values with the laws' amplitudes at the best of SHARES of their sizes, their residual, and
+    (q,) steps of that size."""
     quantities = [q for attached in laws for q in attached.effect.quantities]
-    begins = np.array([q.begins if q.amplitude else n for q, n in zip(quantities, values[new], strict=True)])
-    starts = [start(likelihood, values)]
-    for share in SHARES:
-        numbers = begins + share * (values[new] - begins)
-        if np.all((numbers >= likelihood.low[new]) & (numbers <= likelihood.high[new])):
-            starts.append(start(likelihood, np.append(values[: new[0]], numbers)))
-    costs, _ = cost(likelihood, starts, robust)
-    return starts[int(np.argmin(costs))].values
+    low, high = likelihood.low[len(values) :], likelihood.high[len(values) :]
+    begins = np.array([q.begins if q.amplitude else n for q, n in zip(quantities, numbers, strict=True)])
+    sized = {share: begins + share * (numbers - begins) for share in SHARES}
+    sized = {share: n for share, n in sized.items() if share == 1 or np.all((low <= n) & (n <= high))}
+    starts = [start(likelihood, np.append(values, np.clip(n, low, high))) for n in sized.values()]
+    costs, residuals = cost(likelihood, starts, robust)
+    best = int(np.argmin(costs))
+    return starts[best].values, residuals[best], np.full(len(numbers), abs(list(sized)[best]) / WIDTH)
 
 
 def first_of_each(ordered: Iterable[Runner], name: Callable[[Runner], str]) -> list[Runner]:
