@@ -247,10 +247,10 @@ def _evaluate(term: Term, s: _State) -> tuple[Any, Any, Any]:  # noqa: PLR0911, 
                 return -s.mass * p[0] * s.vy, s.mass * p[0] * s.vx, 0.0
             x, y, z = (s.mass * (p[0] * s.spin[i] + p[1 + i]) for i in range(3))
             return y * s.vz - z * s.vy, z * s.vx - x * s.vz, x * s.vy - y * s.vx
-        case "spring":  # stiffness, rest, softening
+        case "spring":  # stiffness, rest, softening, slack
             away, turn, soft = s.x - p[1], p[2] * (s.x - p[1]), jnp.where(p[2] == 0, 1.0, p[2])
             pull = jnp.where(p[2] > 0, jnp.sin(turn) / soft, jnp.where(p[2] < 0, jnp.sinh(turn) / soft, away))
-            return -p[0] * pull, 0.0, 0.0
+            return -p[0] * pull * (1 - p[3] * jnp.maximum(p[2], 0.0) * jnp.cos(turn)), 0.0, 0.0
         case "cogging":  # cosine and sine amplitude, periods per turn, amplitudes of the second harmonic
             first, second = p[2] * s.x, 2 * p[2] * s.x
             once = p[0] * jnp.cos(first) + p[1] * jnp.sin(first)

@@ -39,7 +39,7 @@ PICTURES: dict[str, Picture] = {
         puck([0.04, 0.0, 2.0], [((-0.4, 0.0), (0.5, 0.0))], show="speed"),
         "the friction beats with one frequency, whatever the speed",
     ),
-    "spring": Picture(torque([0.5, 0.3, 0.0], "angle"), "pulls back to one angle"),
+    "spring": Picture(torque([0.5, 0.3, 0.0, 0.0], "angle"), "pulls back to one angle"),
     "asymmetric_friction": Picture(torque([0.1]), "more friction forwards than backwards"),
     "load_dependent_friction": Picture(
         servo([0.6]), "friction grows with what the drive pushes: heavy moves lag, light ones do not"

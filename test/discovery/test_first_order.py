@@ -42,7 +42,7 @@ def plain(simulator: Simulator, likelihood: Likelihood) -> Hypothesis:
     [
         ("coulomb_friction", [2e-4, 0.0], 0.1),
         ("quadratic_drag", [2e-4], 0.1),
-        ("spring", [2e-3, 0.3, 0.0], 0.2),
+        ("spring", [2e-3, 0.3, 0.0, 0.0], 0.2),
         ("asymmetric_friction", [2e-4], 0.1),
         ("stribeck_friction", [3e-4, 1.0, 0.0], 0.4),
     ],

@@ -38,8 +38,8 @@ BALLS = """<mujoco><option timestep="0.001" gravity="0 0 -9.81"/><worldbody>
 SMOOTH: tuple[tuple[str, tuple[str, ...], tuple[float, ...]], ...] = (
     ("viscous_drag", ("shoulder", "elbow"), (0.2,)),
     ("quadratic_drag", ("elbow",), (0.1,)),
-    ("spring", ("elbow",), (1.5, 0.2, 0.7)),
-    ("spring", ("shoulder",), (0.5, -0.2, -0.4)),
+    ("spring", ("elbow",), (1.5, 0.2, 0.7, 0.8)),
+    ("spring", ("shoulder",), (0.5, -0.2, -0.4, 0.8)),
     ("cogging", ("shoulder",), (0.2, -0.1, 6.0, 0.05, 0.1)),
     ("gravity_tilt", ("upper", "lower"), (0.05, -0.03)),
     ("payload", ("lower",), (0.4, 0.008, 0.004, -0.04)),

@@ -27,7 +27,7 @@ LAWS = [
     ("coulomb_friction", ("elbow",), (0.1, 0.0), 2e-2),
     ("coulomb_friction", ("elbow",), (0.1, 0.02), 1e-6),
     ("viscous_drag", ("shoulder", "elbow"), (0.2,), 5e-3),
-    ("spring", ("elbow",), (1.5, 0.2, 0.0), 1e-6),
+    ("spring", ("elbow",), (1.5, 0.2, 0.0, 0.0), 1e-6),
     ("gravity_tilt", ("upper", "lower"), (0.05, -0.03), 1e-6),
     ("payload", ("lower",), (0.4, 0.008, 0.004, -0.04), 1e-6),
     ("quadratic_drag", ("elbow",), (0.03,), 5e-3),

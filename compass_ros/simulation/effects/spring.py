@@ -1,10 +1,11 @@
 """A spring that the model lacks, or a cable that bends.
 
-F = -stiffness (q - rest), a force on a slide; on a hinge a torque F = -stiffness sin(softening (q - rest)) / softening,
-which is the same at 0. At 1 it is k a b sin(q - rest) of a helical spring between two points beside the axis, a and b
-away from it, as they balance arms. Below 0 it stiffens: F = -stiffness sinh(s (q - rest)) / s with s = -softening.
-Source: Hooke's law; Herder 2001, Energy-free systems, ch. 3 (a spring of zero free length); Fung 1967, Am. J. Physiol.
-213, 1532 (stress of a fibre that stiffens, an exponential of its strain).
+F = -stiffness x, x = q - rest, a force on a slide; on a hinge F = -stiffness (1 - slack s cos(s x)) sin(s x) / s, a
+torque, with s = softening, which is the same at 0. At 1 it is k a b sin x of a helical spring between two points beside the
+axis, a and b away from it, as they balance arms; slack is what a free length takes of that where the points are near,
+to first order in a b / (a^2 + b^2). Below 0 it stiffens: F = -stiffness sinh(s x) / s with s = -softening, no slack.
+Source: Hooke's law; Herder 2001, Energy-free systems, ch. 3 (springs of zero free length, and what another one adds);
+Fung 1967, Am. J. Physiol. 213, 1532 (stress of a fibre that stiffens, an exponential of its strain).
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
     if size.kind == "hinge":
         reach = max(reach, min(math.pi, FARTHEST * size.spread))
     softening = Quantity("softening", "1", -2.0 / size.spread, 1.0, 0.5, amplitude=False, later=True)
+    slack = Quantity("slack", "1", 0.0, 3.0, 0.1, amplitude=False, later=True, grid=3)
     return (
         Quantity("stiffness", size.unit("/L"), 0.0, LARGEST * most, MODEST * most),
         Quantity(
@@ -43,7 +45,7 @@ def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
             amplitude=False,
             start=size.middle,
         ),
-        *([softening] if size.kind == "hinge" else []),
+        *([softening, slack] if size.kind == "hinge" else []),
     )
 
 

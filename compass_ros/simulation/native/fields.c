@@ -226,9 +226,10 @@ static Force evaluate(const Term* term, const State* s) {
       if (p[6] == 2) return along(s, value, term->object == JOINT ? 0 : 1e-3);
       return p[6] == 0 ? (Force){value, 0, 0} : (Force){0, value, 0};
     }
-    case SPRING: {         // p: stiffness, rest, softening
+    case SPRING: {         // p: stiffness, rest, softening, slack
       double away = s->x - p[1], turn = p[2] * away;
-      return (Force){-s->mass * p[0] * (p[2] > 0 ? sin(turn) / p[2] : p[2] < 0 ? sinh(turn) / p[2] : away), 0, 0};
+      double pull = p[2] > 0 ? sin(turn) / p[2] : p[2] < 0 ? sinh(turn) / p[2] : away;
+      return (Force){-s->mass * p[0] * pull * (1 - p[3] * fmax(p[2], 0) * cos(turn)), 0, 0};
     }
     case ASYMMETRIC:       // p: extra friction forwards
       return (s->way ? s->way : s->vx) > 0 ? along(s, p[0], 0) : (Force){0, 0, 0};

@@ -136,33 +136,42 @@ def test_a_spring_swings_with_its_frequency() -> None:
     )
     data = mujoco.MjData(model)
     spring = Attached(effect("spring").at(unit_joint("hinge")), ("axis",))
-    with attach(model, data, Exported((FittedEffect(spring, (4.0, 0.3, 0.0), ()),), {})):
+    with attach(model, data, Exported((FittedEffect(spring, (4.0, 0.3, 0.0, 0.0), ()),), {})):
         mujoco.mj_step(model, data, nstep=round(np.pi / 4.0 / 1e-4))
     assert data.qpos[0] == pytest.approx(0.6, rel=1e-3)  # half a period of 2 pi / sqrt(4 / 0.25)
 
 
-@pytest.mark.parametrize("rest", [0.0, 0.7, -2.0])
-def test_a_spring_on_levers_is_one_between_two_points(rest: float) -> None:
-    """MuJoCo's own: a tendon of zero free length, from 0.2 m beside the axis to 0.1 m out on the link."""
+@pytest.mark.parametrize(
+    ("rest", "out", "free"), [(0.0, 0.1, 0.0), (0.7, 0.1, 0.0), (-2.0, 0.1, 0.0), (0.4, 0.01, 0.1)]
+)
+def test_a_spring_on_levers_is_one_between_two_points(rest: float, out: float, free: float) -> None:
+    """MuJoCo's own: a tendon from 0.2 m beside the axis to a point of the link; with a free length to first order in
+    a b / l^2, l^2 = a^2 + b^2: f / l (1 + a b cos(x) / l^2) of the pull is missing."""
     of = (
         '<mujoco><option timestep="1e-4" gravity="0 0 0"/><worldbody>{anchor}<body><joint name="axis" axis="0 0 1"/>'
-        '<inertial pos="0 0 0" mass="1" diaginertia="1 1 0.25"/><site name="out" pos="0.1 0 0"/></body></worldbody>'
+        '<inertial pos="0 0 0" mass="1" diaginertia="1 1 0.25"/><site name="out" pos="{out} 0 0"/></body></worldbody>'
         "{rest}</mujoco>"
     )
     anchor = f'<site name="fixed" pos="{0.2 * np.cos(rest)} {0.2 * np.sin(rest)} 0"/>'
     tendon = (
-        '<tendon><spatial stiffness="200" springlength="0"><site site="fixed"/><site site="out"/></spatial></tendon>'
+        f'<tendon><spatial stiffness="{20 / out}" springlength="{free}"><site site="fixed"/><site site="out"/>'
+        "</spatial></tendon>"
     )
-    drawn = mujoco.MjModel.from_xml_string(of.format(anchor=anchor, rest=tendon))
-    bare = mujoco.MjModel.from_xml_string(of.format(anchor="", rest=""))
+    product, length = 0.2 * out, np.hypot(0.2, out)
+    of_free = free / length
+    slack = of_free * product / length**2 / (1 - of_free)
+    drawn = mujoco.MjModel.from_xml_string(of.format(anchor=anchor, rest=tendon, out=out))
+    bare = mujoco.MjModel.from_xml_string(of.format(anchor="", rest="", out=out))
     expected, data = mujoco.MjData(drawn), mujoco.MjData(bare)
     spring = Attached(effect("spring").at(unit_joint("hinge")), ("axis",))
-    with attach(bare, data, Exported((FittedEffect(spring, (200 * 0.2 * 0.1, rest, 1.0), ()),), {})):
+    with attach(
+        bare, data, Exported((FittedEffect(spring, (20 / out * product * (1 - of_free), rest, 1.0, slack), ()),), {})
+    ):
         for it, model in ((expected, drawn), (data, bare)):
             it.qpos[0] = rest + 2.0
             mujoco.mj_step(model, it, nstep=5000)
     assert abs(expected.qpos[0] - rest - 2.0) > 0.3
-    assert data.qpos[0] == pytest.approx(expected.qpos[0], abs=1e-6)
+    assert data.qpos[0] == pytest.approx(expected.qpos[0], abs=1e-6 if free == 0 else 2e-3)
 
 
 def test_a_file_of_before_springs_had_levers_still_reads(tmp_path: Path) -> None:
@@ -170,7 +179,7 @@ def test_a_file_of_before_springs_had_levers_still_reads(tmp_path: Path) -> None
     file = tmp_path / "effects.yaml"
     file.write_text(f"effects: [{{name: spring, objects: [it], 'on': hinge, values: {numbers}}}]\nsliding: {{}}\n")
     (back,) = read_effects(file).effects
-    assert back.values == (3.0, 0.1, 0.0)
+    assert back.values == (3.0, 0.1, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("kind", ["hinge", "slide"])
