@@ -1,9 +1,10 @@
 """A spring that the model lacks, or a cable that bends.
 
 F = -stiffness x, x = q - rest, a force on a slide; on a hinge F = -stiffness (1 - slack s cos(s x)) sin(s x) / s, a
-torque, with s = softening, which is the same at 0. At 1 it is k a b sin x of a helical spring between two points beside the
-axis, a and b away from it, as they balance arms; slack is what a free length takes of that where the points are near,
-to first order in a b / (a^2 + b^2). Below 0 it stiffens: F = -stiffness sinh(s x) / s with s = -softening, no slack.
+torque, with s = softening, which is the same at 0. At 1 it is k a b sin x of a helical spring between two points beside
+the axis, a and b away from it, as they balance arms; slack is what a free length takes of that where the points are
+near, to first order in a b / (a^2 + b^2). Below 0 it stiffens: F = -stiffness sinh(s x) / s with s = -softening, no
+slack.
 Source: Hooke's law; Herder 2001, Energy-free systems, ch. 3 (springs of zero free length, and what another one adds);
 Fung 1967, Am. J. Physiol. 213, 1532 (stress of a fibre that stiffens, an exponential of its strain).
 """
