@@ -4,7 +4,7 @@ F = -difference v / |v| while v > 0 and nothing while v < 0, a torque (a force o
 forwards is higher than backwards. Beside a dry friction, which both directions have; where `difference` is negative
 that has to be at least as large, or the joint would be pushed.
 Source: direction-dependent Coulomb friction of geared joints (Armstrong-Helouvry, Dupont and Canudas de Wit 1994,
-sec. 2), faded in as all friction here.
+sec. 2). It holds or creeps as the joint's own dry friction does.
 """
 
 from __future__ import annotations

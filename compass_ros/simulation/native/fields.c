@@ -445,7 +445,8 @@ static void carry_anchor(const mjModel* m, mjData* d, int dof, double rate) {
 // Judice and Pires 1994, which ends after two or three rounds). A soft one is MuJoCo's own constraint of frictionloss
 // (documentation, "Computation"): a + v / tau + R F = 0 with R = (1 - d) / d of the joint's inverse inertia.
 // Where there is such a law all joints' frictionloss is solved for here and none is left for MuJoCo, which would move what
-// is held. That of a joint with a law is in its limits, and holds or creeps with it; that of others is as soft as it is.
+// is held. That of a joint with a law is in its limits, and holds or creeps with it; that of others is as soft as it is,
+// and so is one that a law only skews.
 // With an anchor (cells/rotors.py) a friction is a spring before it slides, stepped by its own implicit formula: the force
 // is -k z - c z', linear in the rate after the step about the one before, and the anchor moves by what does not bend it.
 // Its range is how far the spring bends at rest, k its largest friction over that.
@@ -457,6 +458,8 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
   double load[nv], total[nv], after[nv], unit[nv];
   double low[most], high[most], tau[most], give[most];   // of a soft friction: time constant [s], R
   double drift[most];   // the acceleration that is asked for where no force is
+  double idle[most];    // the force at which a joint rests that nothing pulls
+  int firm[most];       // whether a law has a friction of its own there
   int anchor[most];     // its degree of freedom, or -1
   double rest[most], bent[most], rate[most];   // the largest friction at rest; range of a spring; rate of its anchor
   double force[most], limit[most], right[most], column[most * nv], matrix[most * most];
@@ -471,7 +474,8 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     if (!dry(term)) continue;
     int i = 0;
     while (i < n && dofs[i] != term->dof) i++;
-    if (i == n) dofs[n++] = term->dof, low[i] = high[i] = tau[i] = solved[i] = rest[i] = 0, row[i] = anchor[i] = -1;
+    if (i == n) dofs[n++] = term->dof, low[i] = high[i] = tau[i] = solved[i] = rest[i] = firm[i] = 0, row[i] = anchor[i] = -1;
+    firm[i] |= term->kind != ASYMMETRIC;
     if (term->kind == COULOMB) tau[i] = fmax(tau[i], term->number[1]);
     State s = joint_state(m, d, term);
     s.way = 1, low[i] += evaluate(term, &s).x;
@@ -486,9 +490,9 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     if (d->efc_type[r] != mjCNSTR_FRICTION_DOF) continue;
     int i = 0;
     while (i < n && dofs[i] != d->efc_id[r]) i++;
-    if (i == n) dofs[n++] = d->efc_id[r], low[i] = high[i] = solved[i] = rest[i] = 0, anchor[i] = -1;
+    if (i == n) dofs[n++] = d->efc_id[r], low[i] = high[i] = solved[i] = rest[i] = firm[i] = 0, anchor[i] = -1;
     double damping = d->efc_KBIP[4 * r + 1];   // of 0 no speed is pulled towards zero
-    if (!low[i] && !high[i]) row[i] = r, tau[i] = damping > 0 ? 1 / damping : mjMAXVAL;
+    if (!firm[i] || (!low[i] && !high[i])) row[i] = r, tau[i] = damping > 0 ? 1 / damping : mjMAXVAL;
     low[i] -= d->efc_frictionloss[r], high[i] += d->efc_frictionloss[r], rest[i] += d->efc_frictionloss[r];
     d->efc_frictionloss[r] = 0;
     if (d->nisland) d->iefc_frictionloss[d->map_efc2iefc[r]] = 0;   // where islands are solved, theirs is a copy
@@ -517,8 +521,9 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
         drift[i] = (k * z + stiff * bending) * give[i];
       }
     }
-    double own_give = d->M[own] * give[i], middle = (low[i] + high[i]) / 2;
-    double stop = (own_give * middle - d->M[own] * drift[i] - load[dof]) / (1 + own_give);
+    idle[i] = row[i] < 0 ? (low[i] + high[i]) / 2 : 0;
+    double own_give = d->M[own] * give[i];
+    double stop = (own_give * idle[i] - d->M[own] * drift[i] - load[dof]) / (1 + own_give);
     limit[i] = stop < low[i] ? low[i] : stop > high[i] ? high[i] : NAN;   // not a number: held
   }
   for (int round = 0, changed = 1; changed && round < 3 * n + 3; round++) {
@@ -531,7 +536,7 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     for (int r = 0; r < h; r++) {
       int i = held[r], dof = dofs[i];
       if (!solved[i]) unit[dof] = 1, solve_m(m, d, column + i * nv, unit, 1), unit[dof] = 0, solved[i] = 1;
-      right[r] = -drift[i] - after[dof] + give[i] * (low[i] + high[i]) / 2;
+      right[r] = -drift[i] - after[dof] + give[i] * idle[i];
     }
     for (int r = 0; r < h; r++)
       for (int c = 0; c < h; c++)
@@ -546,9 +551,10 @@ static void hold(const mjModel* m, mjData* d, const Program* program, int most) 
     }
     if (changed) continue;
     for (int i = 0; i < n; i++) {
-      double moving = drift[i] + after[dofs[i]], creeps = give[i] * (high[i] - low[i]) / 2;
+      double moving = drift[i] + after[dofs[i]];
       if (isnan(limit[i]) || low[i] == high[i]) continue;
-      if (limit[i] == low[i] ? moving < creeps : moving > -creeps) limit[i] = NAN, changed = 1;
+      if (limit[i] == low[i] ? moving < give[i] * (idle[i] - low[i]) : moving > give[i] * (idle[i] - high[i]))
+        limit[i] = NAN, changed = 1;
     }
   }
   for (int i = 0; i < n; i++) {
