@@ -34,7 +34,7 @@ def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
     if size.kind == "hinge":
         reach = max(reach, min(math.pi, FARTHEST * size.spread))
     softening = Quantity("softening", "1", -2.0 / size.spread, 1.0, 0.5, amplitude=False, later=True)
-    slack = Quantity("slack", "1", 0.0, 3.0, 0.1, amplitude=False, later=True, grid=3)
+    slack = Quantity("slack", "1", 0.0, 2.0, 0.1, amplitude=False, later=True, grid=5)
     return (
         Quantity("stiffness", size.unit("/L"), 0.0, LARGEST * most, MODEST * most),
         Quantity(
