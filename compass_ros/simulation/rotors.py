@@ -64,7 +64,8 @@ def carry(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Put the rotors where what is between them and their joints carries what the joints hold at rest, in place.
 
     A spring is twisted by what gravity, motion and other forces ask; play is at the flank that carries it, or, where
-    dry friction can hold the joint against a smaller load, between the two.
+    dry friction can hold the joint against a smaller load, between the two. Without a motor a rotor carries nothing:
+    what holds such a joint before it is let go, a hand, holds the link.
     """
     of = rotors(model)
     for joint, rotor in of:
@@ -73,6 +74,8 @@ def carry(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     mujoco.mj_fwdPosition(model, data)
     mujoco.mj_fwdVelocity(model, data)
     for joint, rotor in of:
+        if not _driving(model, rotor):
+            continue
         own, other = model.jnt_dofadr[joint], model.jnt_dofadr[rotor]
         tendon = model.tendon(model.joint(rotor).name).id
         load = float(data.qfrc_bias[own] - data.qfrc_passive[own])

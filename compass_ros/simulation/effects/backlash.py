@@ -3,7 +3,8 @@
 tau = 0 while |theta - q| < play / 2, and beyond whatever keeps it from being more, without bouncing; theta the motor's
 angle behind the gear, rotor theta'' = drive - tau. Zero play is absent: motor and joint are one. `rotor` is a part of
 the joint's armature, where the drawing has one, and `share` of its damping and dry friction is the motor's. An episode
-begins at the flank that carries the joint's load at rest; where dry friction can hold that, between the two.
+begins at the flank that carries the joint's load at rest, where a motor bears that; where dry friction can hold it, or
+there is no motor, between the two.
 Source: Nordin and Gutman 2002, dead-zone model with stiff flanks. In MuJoCo: a second joint, and a tendon with limits
 between them; with an elasticity beside it, a spring with a dead band.
 """

@@ -5,7 +5,7 @@ is the twist, theta the motor's angle behind the gear, k = 1 / compliance, F = `
 theta'' = drive - tau, damping = 2 x 0.05 sqrt(rotor k). It is softer by a share `windup` about no twist, up to F, and
 loses what dry friction within it does. Zero compliance is absent: motor and joint are one. `rotor` is a part of the
 joint's armature, where the drawing has one; `share` of the joint's damping and dry friction is the motor's. An episode
-begins with the spring as the joint's load at rest twists it.
+begins with the spring as the joint's load at rest twists it, where a motor bears that.
 Source: Spong 1987, flexible-joint robots; 0.05 of critical damping is usual in geared and belt drives (Albu-Schaeffer,
 Ott and Hirzinger 2007); wind-up that is soft and hysteresis are what harmonic drives show (Tuttle and Seering 1996;
 Taghirad and Belanger 1998). In MuJoCo: a second joint, and a tendon with stiffness, damping and frictionloss between

@@ -11,10 +11,11 @@ import pytest
 from scipy.optimize import brentq
 
 from compass_ros.cells import Cell
+from compass_ros.cells.rotors import add_rotors
 from compass_ros.errors import ConfigError
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, effect
-from compass_ros.simulation.rotors import onto_rotor
+from compass_ros.simulation.rotors import carry, onto_rotor
 from compass_ros.simulation.sizes import unit_joint
 from compass_ros.types import Floats
 from test.cells.written import content, parameter, written
@@ -218,6 +219,22 @@ def test_an_arm_that_rests_begins_with_its_gear_loaded(tmp_path: Path, friction:
     ):
         seen = angle(cell, numbers, told=0.2 + twist, kind="slide")[:, 0]
         assert np.abs(seen - 0.2).max() < 1.5e-3
+
+
+@pytest.mark.parametrize(("actuator", "twist"), [("", 0.0), ('<actuator><motor joint="axis"/></actuator>', 0.04)])
+def test_a_gear_without_a_motor_begins_unloaded(actuator: str, twist: float) -> None:
+    """Of a link that hangs at 2 N m, its motor bears that; what held it before it was let go, a hand, held the link."""
+    spec = mujoco.MjSpec.from_string(
+        '<mujoco><option gravity="0 0 -2"/><worldbody><body><joint name="axis" axis="0 1 0" armature="0.1"/>'
+        f'<inertial pos="1 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>{actuator}</mujoco>'
+    )
+    add_rotors(spec, ["axis"])
+    model = spec.compile()
+    tendon, _ = onto_rotor(model, "axis", 0.1, 1.0)
+    model.tendon_stiffness[tendon] = 50.0
+    data = mujoco.MjData(model)
+    carry(model, data)
+    assert abs(data.qpos[1] - data.qpos[0]) == pytest.approx(twist, abs=1e-12)
 
 
 def test_a_joint_that_nothing_drives_has_no_gear(tmp_path: Path) -> None:
