@@ -12,11 +12,10 @@ from typing import Literal
 
 import numpy as np
 
-from compass_ros.calibration.noise import measure_noise
 from compass_ros.cells import Cell
 from compass_ros.checks.check import check
 from compass_ros.operation.current import Current, current
-from compass_ros.posing import launched
+from compass_ros.posing import launched, noise_of
 from compass_ros.reporting.from_json import from_json
 from compass_ros.reporting.result_json import read_result
 from compass_ros.simulation.replay import recordings
@@ -68,7 +67,7 @@ def evaluate(cell: Cell, version: Path, episodes: Sequence[Episode], threads: in
     checked = check(cell, episodes)
     sound, without_motion = usable(cell, checked.episodes)
     data = recordings(cell, windows(cell, sound))
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
+    noise = noise_of(cell, data)
     gaps = {}
     for name, model in models.items():
         simulator = model.simulator.driven(data.drives)

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from compass_ros.assembly import assemble
-from compass_ros.calibration.noise import measure_noise
 from compass_ros.calibration.refine import Refined, refine
 from compass_ros.calibration.safeguard import moved_starts
 from compass_ros.cells import Cell
@@ -18,7 +17,7 @@ from compass_ros.discovery import Discovery, data_bad, discover, fit_failed, not
 from compass_ros.errors import DataError
 from compass_ros.estimation import estimate_parameters
 from compass_ros.planning.next_experiment import with_next
-from compass_ros.posing import Posed
+from compass_ros.posing import Posed, noise_of
 from compass_ros.progress import Steady
 from compass_ros.selection import evenly, split, unlike
 from compass_ros.simulation import Simulator
@@ -72,7 +71,7 @@ def _calibrate(
     data = recordings(cell, unlike(cell, cut, config.windows) if cell.spec.windows else evenly(cut, config.episodes))
     judge = recordings(cell, evenly(windows(cell, held_out or fit), config.episodes)).numbered(len(data.names))
     simulator = simulator.driven(data.drives + judge.drives)
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
+    noise = noise_of(cell, data)
     posed = Posed(simulator, data, judge, noise)
     estimate, refined = estimate_parameters(posed.problem, config, steady.share(0.0, first))
     for _ in range(READ):

@@ -9,7 +9,7 @@ import numpy as np
 
 from compass_ros.calibration.launches import unexpected, with_launches
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.noise import Noise
+from compass_ros.calibration.noise import Noise, measure_noise
 from compass_ros.calibration.problem import Problem
 from compass_ros.calibration.refine import Refined
 from compass_ros.cells import Cell
@@ -45,6 +45,11 @@ class Yardstick:
             replay = launched(*self._asked, values)
             self._known[key] = replay, replay.gap(values)
         return self._known[key]
+
+
+def noise_of(cell: Cell, data: Recordings) -> Noise:
+    """Of the sensors that made recordings of a cell."""
+    return measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
 
 
 def pose(simulator: Simulator, data: Recordings, noise: Noise, yardstick: Yardstick | None = None) -> Problem:

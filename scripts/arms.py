@@ -17,7 +17,6 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from compass_ros.bench.driven import Routine, drawn_truth, record
-from compass_ros.calibration.noise import measure_noise
 from compass_ros.cells import Cell, load
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.cells.series import SignalSpec
@@ -25,7 +24,7 @@ from compass_ros.config import CalibrationConfig, calibration_config
 from compass_ros.episodes import read_episodes
 from compass_ros.operation.current import sources
 from compass_ros.pipeline import calibrate
-from compass_ros.posing import launched
+from compass_ros.posing import launched, noise_of
 from compass_ros.reporting.result_json import read_result
 from compass_ros.rivals.inverse_dynamics import Log, as_cell, regress, values
 from compass_ros.selection import split
@@ -131,7 +130,7 @@ def regression(cell: Cell, episodes: list[Episode], config: CalibrationConfig, c
 def judged(cell: Cell, episodes: list[Episode], values: Floats | None = None) -> Mapping[str, SignalGap]:
     """How far the cell is from recordings at (P,) values, or at its defaults; each window begins where it fits best."""
     data = recordings(cell, windows(cell, episodes))
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
+    noise = noise_of(cell, data)
     driven = Simulator(cell).driven(data.drives)
     chosen = driven.defaults if values is None else values
     return launched(driven, data, noise, chosen).gap(chosen, noise.rms).signals

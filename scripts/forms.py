@@ -18,7 +18,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from compass_ros.calibration.noise import measure_noise
 from compass_ros.calibration.refine import Refined, refine
 from compass_ros.cells import Cell, load
 from compass_ros.config import CalibrationConfig
@@ -30,7 +29,7 @@ from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.neighbours import STEPS, modest, rank
 from compass_ros.discovery.race import race
 from compass_ros.estimation import estimate_parameters
-from compass_ros.posing import Posed
+from compass_ros.posing import Posed, noise_of
 from compass_ros.selection import evenly, split, unlike
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import recordings
@@ -100,7 +99,7 @@ def calibrated(cell: Cell, episodes: Sequence[Episode]) -> tuple[Hypothesis, Sim
     data = recordings(cell, unlike(cell, cut, config.windows) if cell.spec.windows else evenly(cut, config.episodes))
     judge = recordings(cell, windows(cell, held_out)).numbered(len(data.names))
     simulator = Simulator(cell, threads=1).driven(data.drives + judge.drives)
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
+    noise = noise_of(cell, data)
     posed = Posed(simulator, data, judge, noise)
     estimate, refined = estimate_parameters(posed.problem, config, silent)
     done: Refined = refined or refine(posed.problem.likelihood, estimate.values)

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compass_ros.bench.case import Case
-from compass_ros.calibration.noise import measure_noise
 from compass_ros.calibration.problem import Problem
 from compass_ros.cells import Cell, load
 from compass_ros.errors import ConfigError
-from compass_ros.posing import pose
+from compass_ros.posing import noise_of, pose
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import Replay, recordings
 from compass_ros.types import QUANTITY_SIZE, Episode, Floats, Track
@@ -57,7 +56,7 @@ def build(case: Case, threads: int = 0) -> World:
     clean = _record(teacher, truth, actions, 0.0, 0.0, judge)
     noisy = _record(teacher, truth, actions, case.noise_m, case.missing, judge)
     data = recordings(cell, fit)
-    problem = pose(simulator, data, measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated))
+    problem = pose(simulator, data, noise_of(cell, data))
     if case.start == "random":
         drawn = problem.low + (problem.high - problem.low) * np.random.default_rng([case.seed, 3]).random(len(truth))
         problem = replace(problem, start=drawn, likelihood=replace(problem.likelihood, prior_mean=drawn))

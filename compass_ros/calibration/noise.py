@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtri
 
 from compass_ros.calibration.encoder import ROOT_12, encoder_step, repeats
-from compass_ros.calibration.in_common import of_its_own
+from compass_ros.calibration.in_common import Bodies, of_its_own
 from compass_ros.types import Bools, Floats
-
-Bodies = Sequence[Sequence[int]]
 
 MOST_CORRELATED = 0.98
 """Beyond it, a residual says nothing of how often it was measured."""
@@ -118,10 +115,9 @@ def measure_noise(
 ) -> Noise:
     """From (E, F) times since the command and (E, F, C) measurements; `expected` [m] where neither can be measured.
 
-    `bodies`: columns of the place of each that one camera sees: what they have in common is no noise (`in_common`).
-
     `stated`: (C,) what the sensor says of itself. It knows of errors that do not change from frame to frame, which no
     scatter shows, so the larger of both counts; and so with an encoder's rounding, which stillness does not show.
+    `bodies`: what these have in common is no noise (`in_common`).
     """
     least = LEAST_SHARE * expected
     step = np.array([encoder_step(list(column), ROOT_12 * least) for column in measured.transpose(2, 0, 1)])

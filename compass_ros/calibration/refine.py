@@ -197,7 +197,7 @@ def growing(
         tolerance = 1.0 if last else 5.0
         if last and len(begun.which) > len(strong):
             strong, onset, linear = begun.which, None, None
-        fit = minimise(part, point, strong, 4, robust, tolerance, linear, last, steps[strong], onset)
+        fit = minimise(part, point, strong, 4, robust, tolerance, linear, fresh=last, steps=steps[strong], onset=onset)
         point, steps[strong], onset, linear = fit.point, difference_steps(fit.linear), fit.linear.onset, None
         yield part, fit
 

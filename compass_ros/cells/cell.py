@@ -137,8 +137,7 @@ class Cell:
     @cached_property
     def filmed(self) -> tuple[tuple[int, ...], ...]:
         """Columns of where each body is that a camera sees [m]: x and y, or x, y and z."""
-        seen = [s for s in self.signals if s.places and not s.jointed]
-        return tuple(tuple(range(s.first, s.first + s.size))[:3] for s in seen)
+        return tuple(tuple(range(s.first, s.first + min(s.size, 3))) for s in self.signals if s.filmed)
 
     @cached_property
     def fitted(self) -> Bools:

@@ -58,6 +58,11 @@ class Signal:
         """Whether it says where something is."""
         return self.quantity in POSITIONS
 
+    @property
+    def filmed(self) -> bool:
+        """Whether a camera sees it: where a body is."""
+        return self.places and not self.jointed
+
 
 def of_object(name: str, quantity: Quantity, body: str, topic: str, frame: str, first: int) -> Signal:
     """An object of the short form."""

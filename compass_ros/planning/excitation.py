@@ -16,11 +16,10 @@ from compass_ros.calibration.cost import start
 from compass_ros.calibration.differences import Linear, difference_steps, linearise
 from compass_ros.calibration.identifiability import information, told
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.noise import measure_noise
 from compass_ros.calibration.settle import FINE
 from compass_ros.errors import DataError
 from compass_ros.planning.motions import Limits, Motions, motions, size
-from compass_ros.posing import pose
+from compass_ros.posing import noise_of, pose
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.driven import Driven, virtual_recordings
 from compass_ros.simulation.replay import recordings
@@ -107,7 +106,7 @@ def _likelihood(simulator: Simulator, episodes: Sequence[Episode], most: int) ->
     every = windows(cell, episodes)
     chosen = np.unique(np.round(np.linspace(0, len(every) - 1, min(len(every), most))).astype(int))
     data = recordings(cell, [every[i] for i in chosen])
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
+    noise = noise_of(cell, data)
     return pose(simulator.driven(data.drives), data, noise).likelihood, len(chosen) / len(every)
 
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from compass_ros.calibration.causal_map import causal_map_refined
-from compass_ros.calibration.noise import Noise, measure_noise
+from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.problem import Problem
 from compass_ros.cells import Cell
 from compass_ros.config import CalibrationConfig
 from compass_ros.errors import DataError
-from compass_ros.posing import pose
+from compass_ros.posing import noise_of, pose
 from compass_ros.selection import split
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import Recordings, recordings
@@ -70,7 +70,7 @@ def problems(
         raise DataError(f"{len(episodes)} episodes and a held-out share of {config.held_out_share:g}: none is held out")
     simulator = Simulator(cell, threads=config.threads)
     data, judge = recordings(cell, fit), recordings(cell, held_out)
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
+    noise = noise_of(cell, data)
     return simulator, pose(simulator, data, noise), data, judge, noise
 
 

@@ -100,10 +100,9 @@ class Physics:
 
     def context(self, sites: tuple[Site, ...], values: Floats) -> Context:
         """What the hooks of an effect on some sites are told."""
-        bodies = [signal for signal in self.cell.signals if signal_kind(signal) == "camera"]
-        columns = [tuple(range(s.first, s.first + s.size)) for s in bodies]
+        turns = tuple(tuple(range(s.first + 3, s.first + s.size)) for s in self.cell.signals if s.filmed)
         sliding = {s.body: s for s in self.dynamics.sliding(self.of_cell(values))}
-        return Context(sites, sliding, tuple(c[:3] for c in columns), tuple(c[3:] for c in columns), self.time_step)
+        return Context(sites, sliding, self.cell.filmed, turns, self.time_step)
 
     def write(self, models: Sequence[mujoco.MjModel], values: Floats) -> None:
         """Parameters and effects into B models. What MuJoCo derives from them (mj_setConst) is the caller's."""
@@ -235,7 +234,7 @@ def signal_kind(signal: Signal) -> SiteKind:
     """What measures a signal."""
     if signal.jointed:
         return "encoder"
-    return "camera" if signal.places else "sensor"
+    return "camera" if signal.filmed else "sensor"
 
 
 def places_of(cell: Cell, dynamics: Dynamics, drives: Drives) -> Places:

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from compass_ros.calibration.methods import method
-from compass_ros.calibration.noise import measure_noise
 from compass_ros.calibration.problem import Allowance
 from compass_ros.config import CalibrationConfig
 from compass_ros.errors import ConfigError, nearest
@@ -18,7 +17,7 @@ from compass_ros.pipeline import calibrate
 from compass_ros.policy import Belief, Case, belief, one, pushing
 from compass_ros.policy.augmented import augmented
 from compass_ros.policy.residual import Residual
-from compass_ros.posing import pose
+from compass_ros.posing import noise_of, pose
 from compass_ros.results import write_all
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import recordings
@@ -96,7 +95,7 @@ class Makers:
         if name == "parameters":
             return self._alone()[None]
         data = recordings(cell, self.episodes)
-        noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated)
+        noise = noise_of(cell, data)
         allowance = Allowance(self.iterations, min(10, len(self.episodes)), 64)
         found = method(name).run(pose(self._fine, data, noise), allowance, self.seed, self.report)
         return found.values[None] if found.draws is None else found.draws

@@ -136,5 +136,5 @@ def test_such_a_law_is_named_with_its_site_and_its_numbers(
     (found,) = mismatch.explanations[0].laws
     assert (found.name, found.sites) == (law, tuple(on.split("+")))
     for name, quantity, number in zip(found.quantities, found.quantities.values(), planted, strict=True):
-        little = 4 * quantity.std if name in FAINT else 0.0  # where motors meet their flanks a fit ends 3 of them off
+        little = 4 * quantity.std if name in FAINT else 0.0  # of a play's these are short: see docs/discovery.md
         assert quantity.value == pytest.approx(number, rel=0.05, abs=max(little, 0.0 if number else 0.01))

@@ -7,11 +7,10 @@ import pytest
 
 from compass_ros.calibration.cost import start
 from compass_ros.calibration.least_squares import minimise
-from compass_ros.calibration.noise import measure_noise
 from compass_ros.discovery.discrepancy import free
 from compass_ros.discovery.response import Response, respond
 from compass_ros.discovery.where import whereabouts
-from compass_ros.posing import pose
+from compass_ros.posing import noise_of, pose
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.simulation.replay import recordings
@@ -32,7 +31,7 @@ def held(tmp_path_factory: pytest.TempPathFactory) -> Response:
         Simulator(cell, laws, threads=1), [*truth, 0.2, 0.6, 0.2], np.stack([goals, goals], 1), 1.2, NOISE, 0
     )
     simulator, data = Simulator(cell, threads=1), recordings(cell, episodes)
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
+    noise = noise_of(cell, data)
     likelihood = pose(simulator, data, noise).likelihood
     fit = minimise(likelihood, start(likelihood, truth), np.arange(2), 10, 4.0)
     return respond(simulator, likelihood, fit)

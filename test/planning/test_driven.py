@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from compass_ros.calibration.noise import measure_noise
 from compass_ros.calibration.refine import refine
 from compass_ros.cells import Cell
 from compass_ros.commands.motions_output import print_motions, write_motions
@@ -23,7 +22,7 @@ from compass_ros.operation.current import read_usable
 from compass_ros.planning.driven import Wishes, plan_driven
 from compass_ros.planning.excitation import Plan, Proposal
 from compass_ros.planning.motions import EFFORT, OVER, limits, motions, size
-from compass_ros.posing import pose
+from compass_ros.posing import noise_of, pose
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.driven import SETTLED_S, driven_joints, virtual_recordings
 from compass_ros.simulation.replay import recordings
@@ -116,7 +115,7 @@ def test_what_is_played_keeps_to_the_limits_and_is_read_again(name: str, tmp_pat
 def errors_of_a_fit(cell: Cell, episodes: list[Episode]) -> Floats:
     """(P,) standard errors of a real fit, in prior widths."""
     data = recordings(cell, windows(cell, episodes))
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
+    noise = noise_of(cell, data)
     likelihood = pose(Simulator(cell).driven(data.drives), data, noise).likelihood
     refined = refine(likelihood, likelihood.prior_mean)
     out = np.ones(len(cell.parameters))

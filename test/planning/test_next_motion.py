@@ -11,7 +11,6 @@ import pytest
 from compass_ros.calibration.cost import start
 from compass_ros.calibration.least_squares import minimise
 from compass_ros.calibration.likelihood import Likelihood
-from compass_ros.calibration.noise import measure_noise
 from compass_ros.cells import Cell
 from compass_ros.discovery import Discovery
 from compass_ros.discovery.hypothesis import Hypothesis, widened
@@ -20,7 +19,7 @@ from compass_ros.errors import DataError
 from compass_ros.operation.current import read_usable
 from compass_ros.planning.next_experiment import NextExperiment, next_experiment, with_next
 from compass_ros.planning.trials import IMPORT, TABLE
-from compass_ros.posing import pose
+from compass_ros.posing import noise_of, pose
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.driven import driven_joints, virtual_recordings
 from compass_ros.simulation.effects import Attached, effect
@@ -56,7 +55,7 @@ def slow(cell: Cell, law: Attached, values: Floats) -> list[Episode]:
 
 def fitted(cell: Cell, episodes: list[Episode], laws: tuple[Attached, ...]) -> Hypothesis:
     data = recordings(cell, windows(cell, episodes))
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
+    noise = noise_of(cell, data)
     plain = Simulator(cell, threads=1).driven(data.drives)
     likelihood: Likelihood = pose(plain, data, noise).likelihood
     simulator, wider = widened(plain, likelihood, laws)

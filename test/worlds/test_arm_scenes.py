@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compass_ros.calibration.noise import measure_noise
 from compass_ros.cells import Cell, load
 from compass_ros.commands.conceal import conceal, write_world
 from compass_ros.concealed.seal import unseal
 from compass_ros.errors import ConfigError
 from compass_ros.operation.current import read
-from compass_ros.posing import launched
+from compass_ros.posing import launched, noise_of
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import recordings
 from compass_ros.simulation.windows import windows
@@ -164,7 +163,7 @@ def test_the_cell_at_the_true_values_plays_the_same_motion(
     assert isinstance(truth, dict)
     values = np.array([truth[p.name] + (later if p.name.endswith("delay") else 0) for p in cell.parameters])
     data = recordings(cell, windows(cell, list(made.episodes[:4])))
-    noise = measure_noise(data.time_s, data.measured, cell.spec.noise_m, data.stated, cell.filmed)
+    noise = noise_of(cell, data)
     gap = launched(Simulator(cell, threads=1).driven(data.drives), data, noise, values).gap(values, noise.rms)
     for signal, bound in most.items():
         found = gap.signals[signal]

@@ -164,9 +164,8 @@ def test_a_spring_on_levers_is_one_between_two_points(rest: float, out: float, f
     bare = mujoco.MjModel.from_xml_string(of.format(anchor="", rest="", out=out))
     expected, data = mujoco.MjData(drawn), mujoco.MjData(bare)
     spring = Attached(effect("spring").at(unit_joint("hinge")), ("axis",))
-    with attach(
-        bare, data, Exported((FittedEffect(spring, (20 / out * product * (1 - of_free), rest, 1.0, slack), ()),), {})
-    ):
+    numbers = (20 / out * product * (1 - of_free), rest, 1.0, slack)
+    with attach(bare, data, Exported((FittedEffect(spring, numbers, ()),), {})):
         for it, model in ((expected, drawn), (data, bare)):
             it.qpos[0] = rest + 2.0
             mujoco.mj_step(model, it, nstep=5000)
