@@ -104,20 +104,22 @@ class LiveReport:
         numbers = {name: value if math.isfinite(value) else None for name, value in said.items()}
         return {"stage": now.stage, "ended": now.ended, "report": version, **numbers}
 
-    def read(self, path: str) -> bytes | None:
-        """One of the files; None where it is not there (yet)."""
-        version, ended = self._shown(), self._state.ended
+    def read(self, path: str) -> tuple[bytes, str] | None:
+        """One of the files and the version that it is at least of; None where it is not there (yet)."""
+        version = self._shown()
         if path not in FILES or version is None:
             return None
         try:
-            content = (self.folder / path[1:]).read_bytes()
+            return (self.folder / path[1:]).read_bytes(), version
         except OSError:
             return None
+
+    def delivered(self, path: str, version: str) -> None:
+        """A browser has all of this file: only now may the process end."""
         if path == "/report.html":
             self._served = version
-            if ended:
+            if self._state.ended and version == self._shown():
                 self._fetched.set()
-        return content
 
     def _version(self) -> str | None:
         """Of the report in the folder; result.json is written after it."""
@@ -158,8 +160,11 @@ def _handler(live: LiveReport) -> type[BaseHTTPRequestHandler]:
                 self._answer(HTTPStatus.OK, "text/html; charset=utf-8", page)
             elif path == "/state.json":
                 self._answer(HTTPStatus.OK, "application/json", json.dumps(live.state()).encode())
-            elif (content := live.read(path)) is not None:
+            elif (read := live.read(path)) is not None:
+                content, version = read
                 self._answer(HTTPStatus.OK, FILES[path], content)
+                if self.command == "GET":
+                    live.delivered(path, version)
             else:
                 self._answer(HTTPStatus.NOT_FOUND, "text/plain", b"not here\n")
 

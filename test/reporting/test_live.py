@@ -74,6 +74,30 @@ def test_a_browser_that_watches_gets_the_last_report(tmp_path: Path, result: Res
     assert time.monotonic() - begun < 3
 
 
+def test_the_server_ends_when_the_last_report_has_arrived_whole(tmp_path: Path, result: Result) -> None:
+    """More than a socket holds, read slowly: a process that ended before would cut it off."""
+    size, arrived = 64 << 20, 0
+
+    def slowly() -> None:
+        nonlocal arrived
+        connection = http.client.HTTPConnection(HOST, live.port, timeout=20)
+        connection.request("GET", "/report.html", headers={"Host": f"localhost:{live.port}"})
+        answer = connection.getresponse()
+        time.sleep(0.5)
+        arrived = len(answer.read())
+
+    with LiveReport(tmp_path, 0, computing=True) as live:
+        (tmp_path / "report.html").write_bytes(b" " * size)
+        write_result(result, tmp_path / "result.json")
+        ask(live, "/state.json")
+        live.end()
+        reader = threading.Thread(target=slowly)
+        reader.start()
+    ended, _ = arrived, reader.join()
+    assert ended > size // 2
+    assert arrived == size
+
+
 def test_an_earlier_result_is_not_what_is_computed_now(tmp_path: Path, result: Result) -> None:
     write(tmp_path, result)
     with LiveReport(tmp_path, 0, computing=True) as live:
