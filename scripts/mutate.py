@@ -17,7 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 DISCOVERY = Path("compass_ros", "discovery")
 TESTS = tuple(
-    f"test_{name}.py" for name in ("evidence", "first_order", "floor", "form", "weakest", "weigh", "servo", "unlisted")
+    f"test_{name}.py" for name in ("evidence", "discrepancy", "first_order", "floor", "form", "weakest", "weigh", "servo", "unlisted")
 )
 """Of test/discovery: those that bring about verdicts on toys."""
 
@@ -33,7 +33,7 @@ class Mutation:
 
 MUTATIONS = (
     Mutation("settings.py", "MOMENTS", "4"),
-    Mutation("settings.py", "MEMORY_S", "3.0"),
+    Mutation("settings.py", "MEMORY_S", "(60.0,)"),
     Mutation("settings.py", "RHO", "(0.0, 1.0, 2.0, 5.0, 10.0, 20.0)"),
     Mutation("settings.py", "RHO_PRIOR", "(1e-9, 1e-9, 1e-9, 1e-9, 1e-9, 1.0)"),
     Mutation("settings.py", "FREE", "(1e-9, 2e-9)"),

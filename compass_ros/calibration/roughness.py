@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import median_abs_deviation
 
 from compass_ros.calibration.cost import Point, robust_loss
 from compass_ros.calibration.differences import LAUNCH_STEP, difference_steps
@@ -21,6 +22,8 @@ SMALL = 0.3
 """Size of the changes that show roughness, in steps of the differences: curvature must not count."""
 DRAWS = 6
 """Random changes that it is averaged over: a budget."""
+MANY = 20
+"""Those that a scatter of likelihoods is read from: a budget, with which it is known to a fifth or so."""
 
 
 def with_rough_starts(likelihood: Likelihood, point: Point) -> Likelihood:
@@ -47,21 +50,30 @@ def with_roughness(likelihood: Likelihood, fit: Fit) -> Likelihood:
 
 
 def unsteady(likelihood: Likelihood, fit: Fit) -> float:
-    """Standard deviation of the log likelihood by roughness: what the same small changes do beyond the linear model."""
-    there, expected = (robust_loss(r, fit.robust).sum(axis=(1, 2, 3)) / 2 for r in _moved(likelihood, fit))
-    return float(np.std(there - expected, ddof=1))
+    """Standard deviation of the log likelihood by roughness, where noise is all that is left: what the same small
+    changes do beyond the linear model, to residuals that are noise.
+
+    From the median absolute deviation (Rousseeuw and Croux 1993): a change that sends a body another way is not where
+    a fit ends, and one such draw would be all of a standard deviation.
+    """
+    there, expected = _moved(likelihood, fit, MANY)
+    seen = ~np.isnan(likelihood.measured)
+    noise = np.where(seen, np.random.default_rng(0).standard_normal(there.shape), 0.0)
+    losses = (robust_loss(r, fit.robust).sum(axis=(1, 2, 3)) / 2 for r in (noise + there - expected, noise))
+    change = np.subtract(*losses)
+    return float(median_abs_deviation(change, scale="normal"))
 
 
-def _moved(likelihood: Likelihood, fit: Fit) -> tuple[Floats, Floats]:
+def _moved(likelihood: Likelihood, fit: Fit, draws: int = DRAWS) -> tuple[Floats, Floats]:
     """(n, E, F, C) residuals [sigma] after small changes from a fit, and as its linear model expects them."""
     rng = np.random.default_rng(0)
     free, steps = fit.free, difference_steps(fit.linear)
-    moves = SMALL * rng.choice([-1.0, 1.0], (DRAWS, len(free))) * steps / np.sqrt(len(free))
-    values = np.tile(fit.point.values, (DRAWS, 1))
+    moves = SMALL * rng.choice([-1.0, 1.0], (draws, len(free))) * steps / np.sqrt(len(free))
+    values = np.tile(fit.point.values, (draws, 1))
     values[:, free] += moves * likelihood.prior_std[free]
     values = np.clip(values, likelihood.low, likelihood.high)
     moves = (values - fit.point.values)[:, free] / likelihood.prior_std[free]
-    launches = _launch_moves(likelihood, rng)
+    launches = _launch_moves(likelihood, rng, draws)
     random = likelihood.launch_std > 0
     there = _residuals(likelihood, values, fit.point.launch + launches)
     expected = fit.linear.residual + np.einsum("efcp,np->nefc", fit.linear.jacobian, moves)
@@ -69,9 +81,9 @@ def _moved(likelihood: Likelihood, fit: Fit) -> tuple[Floats, Floats]:
     return there, expected + np.einsum("efcl,nel->nefc", fit.linear.launch_jacobian, shares)
 
 
-def _launch_moves(likelihood: Likelihood, rng: np.random.Generator) -> Floats:
+def _launch_moves(likelihood: Likelihood, rng: np.random.Generator, draws: int = DRAWS) -> Floats:
     """(n, E, A) small changes of the first states."""
-    drawn = rng.standard_normal((DRAWS, *likelihood.inputs.shape))
+    drawn = rng.standard_normal((draws, *likelihood.inputs.shape))
     return np.asarray(SMALL * LAUNCH_STEP * drawn * likelihood.launch_std)
 
 

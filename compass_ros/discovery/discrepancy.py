@@ -19,20 +19,33 @@ from compass_ros.discovery.settings import FREE, KEPT, MEMORY_S, RHO, RHO_PRIOR
 from compass_ros.types import Floats
 
 
-def spread(response: Response, sizes: Floats) -> Floats | None:
-    """(K S, q) square root of the covariance for (S,) sizes of the discrepancy; None where all are zero."""
-    moments = response.kicks.moments_s
-    kernel = np.exp(-0.5 * ((moments[:, None] - moments) / MEMORY_S) ** 2)
+def spread(response: Response, sizes: Floats, memory_s: float = MEMORY_S[0], moving: bool = False) -> Floats | None:
+    """Square root of the covariance for (S,) sizes of the discrepancy, (K S, q) or (E, K S, q); None where all are zero.
+
+    `moving`: only along the way that a thing moves, as friction does; else in all directions.
+    """
+    moments, on = response.kicks.moments_s, np.flatnonzero(sizes > 0)
+    if not len(on):
+        return None
+    kernel = np.exp(-0.5 * ((moments[:, None] - moments) / memory_s) ** 2)
     variance, axes = np.linalg.eigh(kernel)
     kept = variance > KEPT * variance[-1]
     root = axes[:, kept] * np.sqrt(variance[kept])
-    on = np.flatnonzero(sizes > 0)
-    if not len(on):
-        return None
+    if moving:
+        ways = sizes[:, None] * response.ways  # (E, K, S, n)
+        out = ways[..., None] * root[:, None, None, :]
+        return np.asarray(out.reshape(len(out), out.shape[1] * out.shape[2], -1))
     out = np.zeros((len(moments), len(sizes), len(on), root.shape[1]))
     for i, s in enumerate(on):
         out[:, s, i] = sizes[s] * root
     return out.reshape(len(moments) * len(sizes), -1)
+
+
+def spreads(response: Response, sizes: Floats) -> list[Floats | None]:
+    """Of each correlation length; of forces in all directions and along the motion."""
+    forced = bool(np.any(sizes[: len(response.site_of)] > 0))
+    kinds = (False, True) if forced else (False,)
+    return [spread(response, sizes, memory_s, moving) for moving in kinds for memory_s in MEMORY_S]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,26 +59,29 @@ class Free:
     in_time: float
     """Of the same with one of forces in time."""
     pushes: Floats
-    """(E, K, S) posterior mean of that, of the most probable size."""
+    """(E, K, S) posterior mean of that."""
 
 
 def free(response: Response) -> Free:
     """The model of a response with a discrepancy of any size: of forces or of signals in time, or of place, velocity or
     both."""
-    alone, *found = evidences(response.tangent, [None, *(spread(response, size) for size in free_sizes(response))])
+    forced, read = free_spreads(response)
+    alone, *found = evidences(response.tangent, [None, *forced, *read])
     logs = np.array([f.log for f in found])
-    forces, signals = (log_sum(part) - np.log(len(FREE)) for part in (logs[: len(FREE)], logs[len(FREE) :]))
+    forces, signals = (log_sum(part) - np.log(len(part)) for part in (logs[: len(forced)], logs[len(forced) :]))
     state = log_sum(np.array([shared(response, kernel).log for kernel in KERNELS])) - float(np.log(len(KERNELS)))
-    best, moments = int(np.argmax(logs[: len(FREE)])), len(response.kicks.moments_s)
-    pushes = found[best].pushes.reshape(-1, moments, len(response.unit))
     log = log_sum(np.array([forces, signals, state])) - float(np.log(3))
-    return Free(alone.log, log, float(forces), pushes)
+    shares = np.exp(logs[: len(forced)] - log_sum(logs[: len(forced)]))
+    pushes = np.tensordot(shares, [f.pushes for f in found[: len(forced)]], axes=1)
+    shape = (-1, len(response.kicks.moments_s), len(response.unit))
+    return Free(alone.log, log, float(forces), pushes.reshape(shape))
 
 
-def free_sizes(response: Response) -> list[Floats]:
-    """(S,) sizes that a discrepancy without a law may have, equally probable: of forces first, then of signals."""
-    kinds = [response.unit * response.forces, response.unit * (1 - response.forces)]
-    return [size * kind for kind in kinds for size in FREE]
+def free_spreads(response: Response) -> tuple[list[Floats | None], list[Floats | None]]:
+    """Discrepancies without a law of all sizes and lengths, equally probable: of forces, and of signals."""
+    forces, signals = response.unit * response.forces, response.unit * (1 - response.forces)
+    forced, read = ([one for size in FREE for one in spreads(response, size * of)] for of in (forces, signals))
+    return forced, read
 
 
 def with_law(response: Response, sizes: Floats) -> tuple[float, float]:
@@ -77,12 +93,15 @@ def with_law(response: Response, sizes: Floats) -> tuple[float, float]:
     Args:
         sizes: (S,) rms of the laws along the fitted motion.
     """
-    in_time = evidences(response.tangent, [spread(response, rho * sizes) for rho in RHO])
-    logs = [np.array([f.log for f in in_time])]
+    kinds = [spreads(response, rho * sizes) for rho in RHO[1:]]
+    alone, *found = evidences(response.tangent, [None, *(one for each in kinds for one in each)])
+    of_kinds = np.array([f.log for f in found]).reshape(len(kinds), -1)
+    in_time = np.logaddexp.reduce(of_kinds, axis=1) - np.log(of_kinds.shape[1])
+    logs = [np.append(alone.log, in_time)]
     if np.any(sizes[: len(response.site_of)] > 0):
         for kernel in KERNELS:
-            found = of_sizes(response, features_of(response, kernel, sizes), RHO[1:])
-            logs.append(np.append(logs[0][:1], [f.log for f in found]))
+            shared_by = of_sizes(response, features_of(response, kernel, sizes), RHO[1:])
+            logs.append(np.append(alone.log, [f.log for f in shared_by]))
     each = np.array(logs) + np.log(RHO_PRIOR) - np.log(len(logs))
     total = log_sum(each.ravel())
     return total, float(np.exp(each - total).sum(axis=0) @ np.array(RHO))

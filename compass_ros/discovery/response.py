@@ -109,6 +109,25 @@ class Response:
         path = along(self.simulator.written(self.fit.point.values), [name], states)[name]
         return path.position.reshape(*states.shape[:2], 3), path.velocity.reshape(*states.shape[:2], 3)
 
+    @cached_property
+    def ways(self) -> Floats:
+        """(E, K, S, N) unit vectors along the motion of each of the N sites; zero of turns of bodies and of signals."""
+        model, states = self.simulator.physics.model, self.kicks.states
+        _, dofs = directions(self.simulator, self.sites)
+        speeds = states[..., 1 + model.nq : 1 + model.nq + model.nv][..., dofs]
+        out = np.zeros((*states.shape[:2], len(self.unit), len(self.sites)))
+        for n, own in enumerate(self._straight):
+            speed = np.linalg.norm(speeds[..., own], axis=2, keepdims=True)
+            out[:, :, own, n] = speeds[..., own] / np.maximum(speed, 1e-300)
+        return out
+
+    @property
+    def _straight(self) -> list[Ints]:
+        """Directions in which each site moves along a line: three of a body in space, two in the plane, one of a
+        joint."""
+        straight = [1 if s.kind in JOINTS else 2 if s.kind in PLANAR else 3 for s in self.sites]
+        return [np.flatnonzero(self.site_of == n)[:count] for n, count in enumerate(straight)]
+
     def follows(self, attached: Attached) -> bool:
         """Whether a law is a force on what moves along a path, which pushes say all of."""
         flat = [site.names[0] for site in self.sites[: self.states.shape[2]]]
@@ -172,13 +191,11 @@ class Response:
         return out
 
     def groups(self) -> list[Ints]:
-        """Directions in which one thing moves along a line: three of a body in space, two in the plane, one of a joint;
-        and turns of bodies, each by itself."""
+        """Directions in which one thing moves along a line, and turns of bodies, each by itself."""
         out: list[Ints] = []
-        for n, site in enumerate(self.sites):
-            own = np.flatnonzero(self.site_of == n)
-            straight = len(own) if site.kind in JOINTS else 2 if site.kind in PLANAR else 3
-            out += [own[:straight], *(own[i : i + 1] for i in range(straight, len(own)))]
+        for n, line in enumerate(self._straight):
+            turns = np.setdiff1d(np.flatnonzero(self.site_of == n), line)
+            out += [line, *(turns[i : i + 1] for i in range(len(turns)))]
         return out
 
     def pushed_by(self, attached: Attached) -> Ints:

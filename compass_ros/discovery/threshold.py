@@ -16,7 +16,7 @@ import numpy as np
 from compass_ros.calibration.cost import robust_weight
 from compass_ros.calibration.noise import Noise, correlated
 from compass_ros.calibration.roughness import unsteady
-from compass_ros.discovery.discrepancy import free_sizes, spread
+from compass_ros.discovery.discrepancy import free_spreads
 from compass_ros.discovery.evidence import Factored
 from compass_ros.discovery.first_order import Ranked
 from compass_ros.discovery.response import Response
@@ -68,7 +68,8 @@ def _largest_odds(
     centred = replace(tangent, away=np.zeros_like(tangent.away), own_away=np.zeros_like(tangent.own_away))
     last = np.concatenate([products(c) for c in (tangent.parameters, tangent.own, tangent.pushes)], axis=1)
     plain = Factored(centred, tangent.normal, None).logs(last, squares)
-    spreads = [spread(response, size) for size in free_sizes(response)]
+    forced, read = free_spreads(response)
+    spreads = [*forced, *read]
     by_size = np.stack([Factored(centred, tangent.normal, s).logs(last, squares) for s in spreads])
     best = np.logaddexp.reduce(by_size - np.log(len(spreads)), axis=0) - plain + PRIOR_UNKNOWN
     p, own = tangent.parameters.shape[2], tangent.own.shape[2]
