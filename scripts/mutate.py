@@ -17,7 +17,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 DISCOVERY = Path("compass_ros", "discovery")
 TESTS = tuple(
-    f"test_{name}.py" for name in ("evidence", "discrepancy", "first_order", "floor", "form", "weakest", "weigh", "servo", "unlisted")
+    f"test_{name}.py"
+    for name in ("evidence", "discrepancy", "first_order", "floor", "form", "weakest", "weigh", "servo", "unlisted")
 )
 """Of test/discovery: those that bring about verdicts on toys."""
 
@@ -36,7 +37,7 @@ MUTATIONS = (
     Mutation("settings.py", "MEMORY_S", "(60.0,)"),
     Mutation("settings.py", "RHO", "(0.0, 1.0, 2.0, 5.0, 10.0, 20.0)"),
     Mutation("settings.py", "RHO_PRIOR", "(1e-9, 1e-9, 1e-9, 1e-9, 1e-9, 1.0)"),
-    Mutation("settings.py", "FREE", "(1e-9, 2e-9)"),
+    Mutation("settings.py", "SHOWN, A_DECADE", "0.0, 2"),
     Mutation("settings.py", "PRIOR_UNKNOWN", "50.0"),
     Mutation("settings.py", "PRIOR_LAW", "-5000.0"),
     Mutation("zero.py", "ERROR_BARS", "1e3"),

@@ -16,8 +16,8 @@ concave in r^2): for each such choice the formula gives a lower bound of the log
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -25,9 +25,6 @@ import numpy as np
 from compass_ros.calibration.cost import robust_loss, robust_weight
 from compass_ros.types import Floats
 
-ROUNDS = 2
-"""How often weights are taken anew, as long as the bound rises by SLIGHT: a tenth of what odds are read to."""
-SLIGHT = 0.1
 PIECES = 6
 """Into which an episode is cut for its products: a budget. Nine windows of 530 frames of seven signals, 50 moments:
 1.2 s of processor time in one piece, 0.41 in 4, 0.36 in 6, 0.46 in 10, 0.55 in 24."""
@@ -92,12 +89,6 @@ class Normal:
         constant = float(np.sum(robust_loss(residual, tangent.robust) - weight * residual**2))
         return Normal(gram / tangent.correlation_time, constant / tangent.correlation_time)
 
-    def scaled(self, stds: Floats) -> Normal:
-        """The same where the first parameters' priors are (n,) times as wide."""
-        factor = np.ones(self.gram.shape[1])
-        factor[: len(stds)] = stds
-        return Normal(self.gram * factor[:, None] * factor, self.constant)
-
 
 def _gram(parts: Sequence[Floats], root: Floats) -> Floats:
     """(E, n, n) products of all columns of (E, D, n_i) parts, weighted by the squares of (E, D) roots.
@@ -158,43 +149,34 @@ class Factored:
         inner[:, own_numbers:, own_numbers:] = (
             self._turned @ np.ascontiguousarray(gram[:, hats][:, :, hats]) @ self._mixed
         )
-        self._factor = _root(inner + np.eye(own_numbers + q))
+        self._factor = cholesky(inner + np.eye(own_numbers + q))
         across = np.concatenate([gram[:, own, :p], self._turned @ gram[:, hats, :p]], axis=1)
         self._half = np.linalg.solve(self._factor, across)
         taken, whole = np.einsum("eij,eik->jk", self._half, self._half), gram[:, :p, :p].sum(axis=0)
         self.precision = whole - taken + np.diag(1 + ROUNDING * np.diagonal(whole))
-        self._outer = _root(self.precision)
+        self._outer = cholesky(self.precision)
         self.determinant = sum(
             float(np.log(np.diagonal(f, axis1=-2, axis2=-1)).sum()) for f in (self._factor, self._outer)
         )
 
-    def _steps(self, last: Floats, squares: Floats) -> tuple[Floats, Floats, Floats]:
-        """(m,) logs, (p, m) steps and (E, l + q, m) halves for (E, n, m) products of the columns with residuals."""
-        tangent = self._tangent
-        with_own = last[:, self._own] - tangent.own_away[:, :, None]
-        half = np.linalg.solve(self._factor, np.concatenate([with_own, self._turned @ last[:, self._pushes]], axis=1))
-        pull = last[:, : self._p].sum(axis=0) - np.einsum("eip,eim->pm", self._half, half)
-        pull -= tangent.away[:, None]
-        step = -np.linalg.solve(self._outer.T, np.linalg.solve(self._outer, pull))
-        square = squares + np.sum(tangent.own_away**2) + np.sum(tangent.away**2)
-        square = square - np.sum(half**2, axis=(0, 1)) + np.sum(pull * step, axis=0)
-        return -0.5 * (square + self._constant) - self.determinant, step, half
-
-    def logs(self, last: Floats, squares: Floats) -> Floats:
-        """(m,) log evidences of m residuals: (E, n, m) products of all columns with them, (m,) their squares."""
-        return self._steps(last, squares)[0]
-
     def solved(self, normal: Normal) -> Solved:
         """Of the residual of a tangent."""
-        last = normal.gram[:, :-1, -1:]
-        logs, step, half = self._steps(last, normal.gram[:, -1, -1].sum(keepdims=True))
-        within = -np.linalg.solve(self._factor.transpose(0, 2, 1), self._half @ step + half)
+        tangent, last = self._tangent, normal.gram[:, :-1, -1]
+        with_own = last[:, self._own] - tangent.own_away
+        pushed = (self._turned @ last[:, self._pushes, None])[..., 0]
+        half = np.linalg.solve(self._factor, np.concatenate([with_own, pushed], axis=1)[..., None])[..., 0]
+        pull = last[:, : self._p].sum(axis=0) - np.einsum("eip,ei->p", self._half, half) - tangent.away
+        step = -np.linalg.solve(self._outer.T, np.linalg.solve(self._outer, pull))
+        square = normal.gram[:, -1, -1].sum() + np.sum(tangent.own_away**2) + np.sum(tangent.away**2)
+        square += pull @ step - np.sum(half**2)
+        within = -np.linalg.solve(self._factor.transpose(0, 2, 1), (self._half @ step + half)[..., None])[..., 0]
         push = np.zeros((len(within), self._all))
-        push[:, self._acting] = (self._mixed @ within[:, self._l :])[..., 0]
-        return Solved(float(logs[0]), step[:, 0], within[:, : self._l, 0], push, self.precision)
+        push[:, self._acting] = (self._mixed @ within[:, self._l :, None])[..., 0]
+        log = float(-0.5 * (square + self._constant) - self.determinant)
+        return Solved(log, step, within[:, : self._l], push, self.precision)
 
 
-def _root(matrix: Floats) -> Floats:
+def cholesky(matrix: Floats) -> Floats:
     """Cholesky factor of (..., n, n) matrices whose rows may be of very different size.
 
     Columns that are alike to ROUNDING hold each other as firmly as that.
@@ -214,32 +196,6 @@ def residual_of(tangent: Tangent, solved: Solved) -> Floats:
     left = tangent.residual + tangent.parameters @ solved.parameters
     left += (tangent.own @ solved.own[:, :, None])[..., 0] + (tangent.pushes @ solved.pushes[:, :, None])[..., 0]
     return np.asarray(left)
-
-
-def evidences(tangent: Tangent, spreads: Sequence[Floats | None]) -> list[Solved]:
-    """Of several discrepancies, each with the weights of the residuals that the best of them leaves."""
-    return _weighed(tangent, lambda normal: [solve(tangent, normal, spread) for spread in spreads])
-
-
-def widths(tangent: Tangent, stds: Sequence[Floats]) -> list[Solved]:
-    """The same without a discrepancy, of several widths of the priors: (p,) times as wide as they are."""
-
-    def at(normal: Normal) -> list[Solved]:
-        found = [solve(tangent, normal.scaled(std), None) for std in stds]
-        return [replace(f, parameters=f.parameters * std) for f, std in zip(found, stds, strict=True)]
-
-    return _weighed(tangent, at)
-
-
-def _weighed(tangent: Tangent, at: Callable[[Normal], list[Solved]]) -> list[Solved]:
-    found = at(tangent.normal)
-    for _ in range(ROUNDS):
-        best = max(found, key=lambda s: s.log)
-        again = at(Normal.of(tangent, residual_of(tangent, best)))
-        if max(s.log for s in again) < best.log + SLIGHT:
-            break
-        found = [max(pair, key=lambda s: s.log) for pair in zip(found, again, strict=True)]
-    return found
 
 
 def log_sum(logs: Floats) -> float:

@@ -78,8 +78,9 @@ class Hypothesis:
         """(S,) rms of some of its laws along the fitted motion: accelerations, and errors of signals.
 
         A force has its size along each line on which it could push a body: its direction may be as wrong as its size.
-        What acts on contacts, commands or signals counts as what moves the recordings as much as the laws do when all
-        parameters have taken their best values with them and without: a stiffer wall beside a softer ball is nothing.
+        What acts on contacts, commands, signals or numbers of the scene counts as what moves the recordings as much as
+        the laws do when all parameters have taken their best values with them and without: a stiffer wall beside a
+        softer ball is nothing.
         """
         response, squared = self.response, np.zeros(len(self.response.unit))
         moved = self.bare - self.fit.linear.residual
@@ -87,9 +88,10 @@ class Hypothesis:
         for attached, own in self.own():
             if attached not in laws or attached.effect.scattered:
                 continue  # of a scatter each episode has its own number: no form that could be wrong
-            if attached.effect.forces is not None and attached.effect.channel == "dynamics":
+            pushes = attached.effect.forces is not None and attached.effect.channel == "dynamics"
+            if pushes:
                 squared += np.mean(self._pushed(attached, own) ** 2, axis=(0, 1))
-            else:
+            if not pushes or attached.effect.model is not None:
                 channels.add("sensing" if attached.effect.channel == "sensing" else "motion")
         for group in response.groups():
             squared[group] = squared[group].mean()
@@ -112,7 +114,7 @@ class Hypothesis:
         """(S,) accelerations, each in proportion to its motion's, that move the recordings together as much."""
         unit = self.response.unit * self.response.forces
         root = spread(self.response, unit)
-        by_push = float(np.sum((self.response.tangent.pushes @ root) ** 2)) if root is not None else np.inf
+        by_push = float(np.sum((self.response.tangent.pushes @ root.root) ** 2)) if root is not None else np.inf
         return np.asarray(unit * np.sqrt(np.sum(moved**2) / max(by_push, 1e-300)))
 
     @cached_property

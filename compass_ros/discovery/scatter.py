@@ -15,10 +15,11 @@ from compass_ros.calibration.launches import spreads
 from compass_ros.calibration.least_squares import minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.evidence import evidences, log_sum
+from compass_ros.discovery.evidence import log_sum
 from compass_ros.discovery.first_order import SIGMAS, Ranked
 from compass_ros.discovery.hypothesis import SPREADS, Hypothesis, widened
 from compass_ros.discovery.response import Response
+from compass_ros.discovery.sized import sized
 from compass_ros.types import Floats
 
 TURNS, ITERATIONS = 2, 4
@@ -35,7 +36,7 @@ def ranked_scatter(response: Response, candidate: Candidate) -> Ranked:
     tangent = response.tangent
     none = np.zeros((len(columns), len(modest)))
     logs = [
-        evidences(
+        sized(
             replace(
                 tangent,
                 own=np.concatenate([tangent.own, spread * columns], axis=2),
@@ -45,7 +46,7 @@ def ranked_scatter(response: Response, candidate: Candidate) -> Ranked:
         )[0].log
         for spread in SPREADS
     ]
-    gain = log_sum(np.array(logs)) - float(np.log(len(logs))) - evidences(tangent, [None])[0].log
+    gain = log_sum(np.array(logs)) - float(np.log(len(logs))) - sized(tangent, [None])[0].log
     largest = max(q.high / q.scale for q in candidate.attached.effect.quantities)
     seen = largest * float(np.linalg.norm(columns)) > SIGMAS
     return Ranked(candidate, SPREADS[int(np.argmax(logs))] * modest, columns[:, :, :0], gain, seen)

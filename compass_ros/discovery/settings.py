@@ -7,15 +7,17 @@ import numpy as np
 MOMENTS = 50
 """Moments of an episode at which pushes are given: 50 ms apart in the ordinary 2.5 s, a third of the least MEMORY_S."""
 MEMORY_S = (0.15, 0.5, 1.5, 5.0)
-"""Correlation lengths in time of the discrepancy [s], equally probable: from some frames to a constant of each recording.
-With the first alone what varies slowly pays for what varies fast, and a wrong law is cheaper: of gusts (`ball_flight_air`
-1030001) the four have log evidences of 2624, 2698, 2715 and 2721 over none."""
+"""Correlation lengths in time of the discrepancy [s], equally probable: from some frames to a constant of each
+recording. With the first alone what varies slowly pays for what varies fast, and a wrong law is cheaper: of gusts
+(`ball_flight_air` 1030001) the four have log evidences of 2624, 2698, 2715 and 2721 over none."""
 RHO = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2)
 RHO_PRIOR = (0.32, 0.21, 0.16, 0.15, 0.1, 0.06)
 """Size of the discrepancy of a law, as a share of the law's own: published forms of one law differ by 2 to 10 per
 cent of it, and one that would need more than a fifth is another law (the study's table)."""
-FREE = tuple(np.geomspace(1e-3, 1.0, 10).tolist())
-"""Size of the discrepancy without a law, as a share of what moves and holds a site (`at_work`), equally probable."""
+SHOWN, A_DECADE = float(np.log(99)), 2
+"""Sizes of a discrepancy without a law are equally probable, so many a decade: up to all that moves and holds a site
+(`at_work`), from the least that would be odds of 99 in recordings without it, for what they cannot show is no
+explanation of them. An encoder of 0.2 mrad shows 1e-5 of what holds an arm."""
 PRIOR_UNKNOWN = float(np.log(0.5))
 PRIOR_LAW = float(np.log(0.5))
 """Log prior odds against the plain model: half of the probability is that nothing is missing, a quarter that of

@@ -16,11 +16,11 @@ import numpy as np
 from compass_ros.calibration.cost import robust_weight
 from compass_ros.calibration.noise import Noise, correlated
 from compass_ros.calibration.roughness import unsteady
-from compass_ros.discovery.discrepancy import free_spreads
-from compass_ros.discovery.evidence import Factored
+from compass_ros.discovery.discrepancy import kinds_of
 from compass_ros.discovery.first_order import Ranked
 from compass_ros.discovery.response import Response
 from compass_ros.discovery.settings import PRIOR_UNKNOWN
+from compass_ros.discovery.sized import Reduced
 from compass_ros.types import Floats
 
 BEYOND = 2
@@ -67,18 +67,25 @@ def _largest_odds(
 
     centred = replace(tangent, away=np.zeros_like(tangent.away), own_away=np.zeros_like(tangent.own_away))
     last = np.concatenate([products(c) for c in (tangent.parameters, tangent.own, tangent.pushes)], axis=1)
-    plain = Factored(centred, tangent.normal, None).logs(last, squares)
-    forced, read = free_spreads(response)
-    spreads = [*forced, *read]
-    by_size = np.stack([Factored(centred, tangent.normal, s).logs(last, squares) for s in spreads])
-    best = np.logaddexp.reduce(by_size - np.log(len(spreads)), axis=0) - plain + PRIOR_UNKNOWN
+    reduced = Reduced(centred, tangent.normal, last, squares)
+    (plain,) = reduced.logs(reduced.axes(None), [1.0])
+    kinds = [[reduced.axes(one) for part in kind.values() for one in part] for kind in kinds_of(response)]
+    by_kind = [_mean([_mean(reduced.logs(axes, axes.shown())) for axes in kind]) for kind in kinds]
+    best = _mean(by_kind) - plain + PRIOR_UNKNOWN
     p, own = tangent.parameters.shape[2], tangent.own.shape[2]
     narrow = replace(centred, pushes=centred.pushes[:, :, :0])  # a law alone has no discrepancy here
     for one, prior in zip(ranked, priors, strict=True):
         wider = narrow.more(one.columns, np.zeros(one.columns.shape[2]))
         more = np.concatenate([last[:, :p], products(one.columns), last[:, p : p + own]], axis=1)
-        best = np.maximum(best, Factored(wider, wider.normal, None).logs(more, squares) - plain + prior)
+        reduced = Reduced(wider, wider.normal, more, squares)
+        (with_it,) = reduced.logs(reduced.axes(None), [1.0])
+        best = np.maximum(best, with_it - plain + prior)
     return np.asarray(best)
+
+
+def _mean(logs: Sequence[Floats] | Floats) -> Floats:
+    """(m,) logarithms of the mean of exponentials of (n, m)."""
+    return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(logs)))
 
 
 def simulated(response: Response, noise: Noise, rng: np.random.Generator) -> Floats:

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from compass_ros.discovery.discrepancy import Free, spread
-from compass_ros.discovery.evidence import evidences, log_sum
-from compass_ros.discovery.kernels import Shared, shared
+from compass_ros.discovery.discrepancy import ALL, Free, Part
 from compass_ros.discovery.maps import in_plane
 from compass_ros.discovery.response import Response
-from compass_ros.discovery.settings import FREE
 from compass_ros.simulation.site_kinds import JOINTS
 from compass_ros.types import DependsOn, Floats, Interval, Region, Where
 
@@ -25,61 +20,30 @@ CLEARLY = 3.0
 
 def whereabouts(response: Response, free: Free) -> Where:
     """Site, channel, place and kind of a free discrepancy."""
-    other, best = sorted((shared(response, "velocity"), shared(response, "place")), key=lambda one: one.log)
-    n, moved = _one_or_all(response, [_pushes(response, n) for n in range(len(response.sites))])
-    sensors = _sensors(response)
-    s, read = _one_or_all(response, list(sensors.values()))
-    if read > max(moved, best.log):
-        return Where(list(sensors)[s] if s is not None and len(sensors) > 1 else "all", "all", "sensing")
-    name = response.sites[n].name if n is not None and len(response.sites) > 1 else "all"
-    depends_on = _depends_on(best, other, free)
+    by_place, by_speed = ([part for part in free.state if part.of == kernel] for kernel in ("place", "velocity"))
+    other, best = sorted((max(of, key=lambda part: part.log) for of in (by_place, by_speed)), key=lambda part: part.log)
+    on_one, of_one = (max(parts, key=lambda part: part.log) for parts in (free.forces, free.signals))
+    if of_one.log > max(on_one.log, best.log):
+        return Where(of_one.name, "all", "sensing")
+    depends_on = _depends_on(best, other, on_one)
     pushes = free.pushes if depends_on == "time" else best.pushes
     return Where(
-        name,
+        on_one.name,
         "free",
         "dynamics",
         region(response, pushes) if depends_on != "velocity" else None,
-        interval=interval(response, pushes, n, depends_on),
+        interval=interval(response, pushes, on_one.name, depends_on),
         depends_on=depends_on,
     )
 
 
-def _pushes(response: Response, n: int) -> Floats:
-    """(S,) 1 for the forces on one site."""
-    return np.pad((response.site_of == n).astype(float), (0, len(response.unit) - len(response.site_of)))
-
-
-def _sensors(response: Response) -> dict[str, Floats]:
-    """(S,) 1 for the errors of each encoder, by `signal.joint`, and of each other signal."""
-    out: dict[str, Floats] = {}
-    for signal in response.simulator.cell.signals:
-        if not signal.fitted:
-            continue
-        named = zip(signal.numbers, range(signal.first, signal.first + signal.size), strict=True)
-        each = {f"{signal.name}.{n}": slice(i, i + 1) for n, i in named} if signal.jointed and signal.size > 1 else {}
-        for name, columns in (each or {signal.name: signal.columns}).items():
-            out[name] = np.zeros(len(response.unit))
-            out[name][len(response.site_of) :][columns] = 1.0
-    return out
-
-
-def _one_or_all(response: Response, each: Sequence[Floats]) -> tuple[int | None, float]:
-    """Which of some (S,) parts has the highest evidence for a discrepancy of its own, None: all together; and that."""
-    logs = []
-    for on in (np.sum(each, axis=0), *each):
-        found = evidences(response.tangent, [spread(response, s * on * response.unit) for s in FREE])
-        logs.append(log_sum(np.array([f.log for f in found])) - float(np.log(len(FREE))))
-    best = int(np.argmax(logs))
-    return best - 1 if best else None, logs[best]
-
-
-def _depends_on(best: Shared, other: Shared, free: Free) -> DependsOn | None:
+def _depends_on(best: Part, other: Part, in_time: Part) -> DependsOn | None:
     """Place or velocity where a function of it has clearly more evidence than of the other, or than one of time."""
-    if free.in_time > best.log + CLEARLY:
+    if in_time.log > best.log + CLEARLY:
         return "time"
-    if best.log < max(other.log, free.in_time) + CLEARLY:
+    if best.log < max(other.log, in_time.log) + CLEARLY:
         return None
-    return "place" if best.kernel == "place" else "velocity"
+    return "place" if best.of == "place" else "velocity"
 
 
 def region(response: Response, pushes: Floats) -> Region | None:
@@ -97,10 +61,12 @@ def region(response: Response, pushes: Floats) -> Region | None:
     return Region((float(centre[0]), float(centre[1])), radius) if wide < WIDE else None
 
 
-def interval(response: Response, pushes: Floats, n: int | None, depends_on: DependsOn | None) -> Interval | None:
+def interval(response: Response, pushes: Floats, name: str, depends_on: DependsOn | None) -> Interval | None:
     """The shortest range of an angle, or of a speed, that holds most of the pushes on one site; None: no such range."""
-    if n is None or depends_on not in ("place", "velocity"):
+    names = [site.name for site in response.sites]
+    if (name == ALL and len(names) > 1) or depends_on not in ("place", "velocity"):
         return None
+    n = names.index(name) if len(names) > 1 else 0
     joint = response.sites[n].kind in JOINTS
     place, rate = (one.reshape(-1, one.shape[2]) for one in response.along(n))
     unit = response.simulator.unit if joint else "m"

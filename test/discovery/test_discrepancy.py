@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compass_ros.discovery.discrepancy import spread, spreads
-from compass_ros.discovery.evidence import evidences
+from compass_ros.discovery.sized import sized
 from test.discovery.test_weigh import plain
 
 SHARE = 0.1
@@ -27,13 +27,15 @@ def test_a_force_of_any_length_is_nearly_as_probable_as_with_its_own(
     assert own is not None
     rng = np.random.default_rng(1)
     episodes = len(response.tangent.residual)
-    pushed = np.broadcast_to(own, (episodes, *own.shape[-2:])) @ rng.standard_normal((episodes, own.shape[-1], 1))
+    pushed = np.broadcast_to(own.root, (episodes, *own.root.shape[-2:])) @ rng.standard_normal(
+        (episodes, own.root.shape[-1], 1)
+    )
     moved = (response.tangent.pushes @ pushed)[..., 0]
     tangent = replace(response.tangent, residual=response.tangent.residual + moved)
     wrong = spread(response, sizes, 100.0 if memory_s < 2 else 0.05, moving)
     other = spread(response, sizes, memory_s, not moving)
     true, of_wrong, of_other, *asked = (
-        f.log for f in evidences(tangent, [own, wrong, other, *spreads(response, sizes)])
+        f.log for f in sized(tangent, [own, wrong, other, *spreads(response, sizes)], [1.0])
     )
     assert min(true - of_wrong, true - of_other) > 10
     assert true - max(asked) < SHARE * min(true - of_wrong, true - of_other)

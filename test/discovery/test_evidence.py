@@ -10,7 +10,8 @@ from scipy.integrate import quad
 from scipy.stats import multivariate_normal
 
 from compass_ros.calibration.cost import robust_loss
-from compass_ros.discovery.evidence import Factored, Normal, Tangent, evidences, log_sum, residual_of, solve
+from compass_ros.discovery.evidence import Normal, Tangent, log_sum, residual_of, solve
+from compass_ros.discovery.sized import Reduced, Spread, sized
 from compass_ros.types import Floats
 
 EPISODES, ROWS, PARAMETERS, OWN, PUSHES = 3, 40, 4, 2, 6
@@ -76,15 +77,43 @@ def test_the_maximum_is_that_of_least_squares() -> None:
     assert residual_of(tangent, found).ravel() == pytest.approx(left, abs=1e-9)
 
 
-def test_many_residuals_at_once_are_as_each_alone() -> None:
+@pytest.mark.parametrize("kind", ["none", "alike", "by episode", "shared"])
+def test_many_residuals_and_sizes_at_once_are_as_each_alone(kind: str) -> None:
     tangent = drawn(7)
-    others = np.random.default_rng(8).normal(size=(4, EPISODES, ROWS))
-    factored = Factored(tangent, tangent.normal, None)
+    rng = np.random.default_rng(8)
+    others = rng.normal(size=(4, EPISODES, ROWS))
+    root = rng.normal(size=(PUSHES, 5) if kind == "alike" else (EPISODES, PUSHES, 5))
+    spread = None if kind == "none" else Spread(root, shared=kind == "shared")
     columns = np.concatenate([tangent.parameters, tangent.own, tangent.pushes], axis=2)
-    last = np.einsum("edn,med->enm", columns, others)
-    together = factored.logs(last, np.sum(others**2, axis=(1, 2)))
-    alone = [solve(t, t.normal, None).log for t in (replace(tangent, residual=r) for r in others)]
-    assert together == pytest.approx(alone, abs=1e-9)
+    last, sizes = np.einsum("edn,med->enm", columns, others), (1e-4, 0.3, 20.0)
+    reduced = Reduced(tangent, tangent.normal, last, np.sum(others**2, axis=(1, 2)))
+    together = reduced.logs(reduced.axes(spread), sizes)
+    alone = [[_alone(replace(tangent, residual=r), spread, size) for r in others] for size in sizes]
+    assert together == pytest.approx(np.array(alone), abs=1e-8)
+
+
+def _alone(tangent: Tangent, spread: Spread | None, size: float) -> float:
+    """One log evidence, factored anew; what is shared stands among the parameters."""
+    if spread is None or not spread.shared:
+        return solve(tangent, tangent.normal, None if spread is None else size * spread.root).log
+    wider = tangent.more(size * tangent.pushes @ spread.root, np.zeros(spread.root.shape[2]))
+    return solve(wider, wider.normal, None).log
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_the_least_size_is_one_that_its_absence_would_show(shared: bool) -> None:
+    """Odds of 99 against it, in the mean of recordings that are noise."""
+    tangent = drawn(17)
+    none = np.zeros((EPISODES, ROWS, 0))
+    tangent = replace(
+        tangent, parameters=none, own=none, away=np.zeros(0), own_away=np.zeros((EPISODES, 0)), robust=1e9
+    )
+    rng = np.random.default_rng(18)
+    spread = Spread(rng.normal(size=(EPISODES, PUSHES, 5)), shared)
+    size = Reduced(tangent, tangent.normal).axes(spread).shown()[0]
+    draws = [replace(tangent, residual=rng.normal(size=(EPISODES, ROWS))) for _ in range(400)]
+    against = [_alone(t, None, 1.0) - _alone(t, spread, size) for t in draws]
+    assert np.mean(against) == pytest.approx(np.log(99), abs=4 * float(np.std(against)) / 20)
 
 
 def test_a_parameter_that_says_nothing_costs_nothing() -> None:
@@ -119,7 +148,7 @@ def test_of_a_robust_loss_it_is_a_lower_bound_that_comes_close(outlier: float) -
     least = min(cost(x) for x in np.linspace(-6, 2, 400))
     integral = quad(lambda x: np.exp(least - cost(x)), -8, 4, limit=200)[0]
     exact = float(np.log(integral / np.sqrt(2 * np.pi))) - least
-    found = evidences(tangent, [None])[0].log
+    found = sized(tangent, [None])[0].log
     assert found <= exact + 1e-6
     assert found > exact - 0.7
 
@@ -131,7 +160,7 @@ def test_weights_follow_what_a_discrepancy_explains() -> None:
     push = np.repeat(np.eye(3), 20, axis=0)[None]
     residual = (push @ np.array([40.0, -25.0, 30.0]))[..., 0] + rng.normal(size=rows)
     tangent = Tangent(residual, none, none, push, np.zeros(0), np.zeros((1, 0)), 4.0, 1.0)
-    without, found = evidences(tangent, [None, 30.0 * np.eye(3)])
+    without, found = sized(tangent, [None, Spread(np.eye(3))], [30.0])
     exact = replace(tangent, robust=WIDE)
     assert found.log == pytest.approx(solve(exact, exact.normal, 30.0 * np.eye(3)).log, abs=3.0)
     assert found.log > without.log + 100

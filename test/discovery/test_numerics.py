@@ -15,11 +15,12 @@ from compass_ros.calibration.cost import start
 from compass_ros.calibration.differences import linearise
 from compass_ros.calibration.least_squares import Fit, minimise
 from compass_ros.cells import load
-from compass_ros.discovery.evidence import Tangent, evidences
+from compass_ros.discovery.evidence import Tangent
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.nuisances import finite_step, nuisances, stated_errors
 from compass_ros.discovery.numerics import friction_that_holds, numerics_as_model, shorter_step
 from compass_ros.discovery.response import Response
+from compass_ros.discovery.sized import sized
 from compass_ros.planning.planned import perfect
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import EFFECTS, Attached
@@ -67,7 +68,7 @@ def test_other_numerics_call_for_nothing(
     response = response_of(replace(clean, measured=measured))
     plain, blind = Hypothesis((), response.simulator, response.likelihood, response.fit), without_nuisances(response)
     assert plain.free.log - plain.free.alone < 0
-    assert evidences(response.tangent, [None])[0].log > evidences(blind, [None])[0].log + 5
+    assert sized(response.tangent, [None])[0].log > sized(blind, [None])[0].log + 5
 
 
 def test_a_contact_falls_into_a_step_by_chance() -> None:
@@ -82,7 +83,7 @@ def test_a_contact_falls_into_a_step_by_chance() -> None:
     launches = response.launches.shape[2]
     common = replace(tangent, own=tangent.own[:, :, :launches], own_away=tangent.own_away[:, :launches])
     assert plain.free.log - plain.free.alone < 0
-    assert evidences(tangent, [None])[0].log > evidences(common, [None])[0].log + 1000
+    assert sized(tangent, [None])[0].log > sized(common, [None])[0].log + 1000
 
 
 def with_step(step: float, by: Simulator) -> Hypothesis:
@@ -127,7 +128,7 @@ def test_friction_that_holds_where_the_engine_creeps_calls_for_nothing(tmp_path:
     tangent, blind = plain.response.tangent, without_nuisances(plain.response)
     assert tangent.parameters.shape[2] == len(tangent.away) == 5
     assert plain.free.log < plain.free.alone
-    assert evidences(tangent, [None])[0].log > evidences(blind, [None])[0].log + 5
+    assert sized(tangent, [None])[0].log > sized(blind, [None])[0].log + 5
     np.testing.assert_allclose(tangent.parameters[..., -1], -tangent.residual, atol=1e-9)
 
 

@@ -1,0 +1,181 @@
+"""Log evidences of discrepancies of many sizes: their products are diagonalised once, for any number of sizes.
+
+With each episode's own numbers integrated out, a discrepancy M z, z ~ N(0, s^2), has the products M' G M = V w V'. That
+of size s has a determinant of prod(1 + s^2 w), and takes s^2 / (1 + s^2 w) of the products along each axis of V.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import brentq
+
+from compass_ros.discovery.evidence import (
+    ROUNDING,
+    Normal,
+    Solved,
+    Tangent,
+    cholesky,
+    log_sum,
+    residual_of,
+    solve,
+)
+from compass_ros.discovery.settings import A_DECADE, SHOWN
+from compass_ros.types import Floats
+
+ROUNDS = 2
+"""How often weights are taken anew, as long as the bound rises by SLIGHT: a tenth of what odds are read to."""
+SLIGHT = 0.1
+_NOTHING = 1e-12
+"""Size of a discrepancy, as a share of all that is at work, that no recording shows."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """A discrepancy `root` z, z standard normal, of any size."""
+
+    root: Floats
+    """(H, q), or (E, H, q) where episodes differ."""
+    shared: bool = False
+    """One z for all episodes; else another one in each."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sized:
+    """A discrepancy in several sizes that are equally probable."""
+
+    sizes: Floats
+    """(S,)"""
+    logs: Floats
+    """(S,) log evidences."""
+
+    @property
+    def log(self) -> float:
+        return log_sum(self.logs) - float(np.log(len(self.logs)))
+
+
+@dataclass(frozen=True, eq=False)
+class Axes:
+    """A discrepancy along the axes of its products, of all episodes together where it is shared."""
+
+    values: Floats
+    """(E, q) eigenvalues."""
+    across: Floats
+    """(E, q, p + m) products with parameters and residuals."""
+
+    def shown(self) -> Floats:
+        """(S,) sizes from the least that recordings would show to be absent, A_DECADE of each up to 1.
+
+        Where there is none, its log evidence is less by sum(log(1 + s^2 w) - s^2 w / (1 + s^2 w)) / 2 in the mean.
+        """
+
+        def against(log_size: float) -> float:
+            x = np.exp(2 * log_size) * self.values
+            return 0.5 * float(np.sum(np.log1p(x) - x / (1 + x))) - SHOWN
+
+        first = np.log(_NOTHING)
+        if against(0.0) <= 0 or against(first) >= 0:
+            return np.ones(1)
+        least = float(brentq(against, first, 0.0))
+        return np.geomspace(np.exp(least), 1.0, int(np.ceil(-least / np.log(10) * A_DECADE)) + 1)
+
+
+class Reduced:
+    """A tangent with each episode's own numbers integrated out, for any residuals."""
+
+    def __init__(
+        self, tangent: Tangent, normal: Normal, last: Floats | None = None, squares: Floats | None = None
+    ) -> None:
+        """`last`, `squares`: (E, n, m) products of all columns with m residuals and (m,) their squares, weighted as
+        `normal`; None: the tangent's own residual."""
+        gram = normal.gram
+        if last is None or squares is None:
+            last, squares = gram[:, :-1, -1:], gram[:, -1, -1].sum(keepdims=True)
+        self._p, numbers = tangent.parameters.shape[2], tangent.own.shape[2]
+        self._first = self._p + tangent.pushes.shape[2]
+        own = slice(self._p, self._p + numbers)
+        rest = np.delete(np.arange(gram.shape[1] - 1), own)
+        factor = cholesky(gram[:, own, own] + np.eye(numbers))
+        with_own = last[:, own] - tangent.own_away[:, :, None]
+        half = np.linalg.solve(factor, np.concatenate([gram[:, own][:, :, rest], with_own], axis=2))
+        self._left = np.concatenate([gram[:, rest][:, :, rest], last[:, rest]], axis=2)
+        self._left -= half[:, :, : len(rest)].transpose(0, 2, 1) @ half
+        squares = squares + np.sum(tangent.own_away**2) + np.sum(tangent.away**2) + normal.constant
+        self._squares = squares - np.sum(half[:, :, len(rest) :] ** 2, axis=(0, 1))
+        self._determinant = float(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum())
+        self._away = tangent.away
+        self._rounding = 1 + ROUNDING * np.diagonal(gram[:, : self._p, : self._p].sum(axis=0))
+
+    def axes(self, spread: Spread | None) -> Axes:
+        p, first = self._p, self._first
+        if spread is None:
+            return Axes(np.zeros((1, 0)), np.zeros((1, 0, p + self._left.shape[2] - first)))
+        root = spread.root
+        acting = np.flatnonzero(root.any(axis=tuple(i for i in range(root.ndim) if i != root.ndim - 2)))
+        turned = np.swapaxes(root[..., acting, :], -2, -1)
+        rows = self._left[:, p + acting]
+        products = turned @ rows[:, :, p + acting] @ np.swapaxes(turned, -2, -1)
+        across = turned @ np.concatenate([rows[:, :, :p], rows[:, :, first:]], axis=2)
+        if spread.shared:
+            products, across = products.sum(axis=0, keepdims=True), across.sum(axis=0, keepdims=True)
+        values, axes = np.linalg.eigh(products)
+        return Axes(np.maximum(values, 0.0), np.swapaxes(axes, -2, -1) @ across)
+
+    def logs(self, axes: Axes, sizes: Sequence[float] | Floats) -> Floats:
+        """(S, m) log evidences."""
+        p, first = self._p, self._first
+        fixed = np.concatenate([self._left[:, :p, :p], self._left[:, :p, first:]], axis=2).sum(axis=0)
+        fixed[:, p:] -= self._away[:, None]
+        out = []
+        for size in sizes:
+            taken = axes.across * (size**2 / (1 + size**2 * axes.values))[:, :, None]
+            both = fixed - np.tensordot(axes.across[:, :, :p], taken, axes=([0, 1], [0, 1]))
+            outer = cholesky(both[:, :p] + np.diag(self._rounding))
+            pulled = np.linalg.solve(outer, both[:, p:])
+            square = self._squares - np.einsum("eqm,eqm->m", axes.across[:, :, p:], taken[:, :, p:])
+            wide = self._determinant + 0.5 * np.log1p(size**2 * axes.values).sum() + np.log(np.diagonal(outer)).sum()
+            out.append(-0.5 * (square - np.sum(pulled**2, axis=0)) - wide)
+        return np.array(out)
+
+
+def sized(tangent: Tangent, spreads: Sequence[Spread | None], sizes: Sequence[float] | None = None) -> list[Sized]:
+    """Evidences of discrepancies, with the weights of the residuals that the best of them leaves; None: without one.
+
+    `sizes`: None for those that recordings would show to be absent (`Axes.shown`).
+    """
+    found: list[Sized] = []
+    residual = tangent.residual
+    for _ in range(1 + ROUNDS):
+        normal = Normal.of(tangent, residual) if found else tangent.normal
+        reduced = Reduced(tangent, normal)
+        axes = [reduced.axes(spread) for spread in spreads]
+        if not found:
+            asked = [np.ones(1) if s is None else a.shown() if sizes is None else np.array(sizes)
+                     for s, a in zip(spreads, axes, strict=True)]  # fmt: skip
+            found = [Sized(of, np.full(len(of), -np.inf)) for of in asked]
+        before = max(float(one.logs.max()) for one in found)
+        now = [reduced.logs(a, one.sizes)[:, 0] for a, one in zip(axes, found, strict=True)]
+        found = [replace(one, logs=np.maximum(one.logs, of)) for one, of in zip(found, now, strict=True)]
+        best = int(np.argmax([of.max() for of in now]))
+        if now[best].max() < before + SLIGHT:
+            break
+        residual = _maximum(tangent, residual, spreads[best], float(found[best].sizes[np.argmax(now[best])]))[1]
+    return found
+
+
+def mean(tangent: Tangent, spread: Spread | None, size: float) -> Floats:
+    """(E, H) posterior mean of a discrepancy of a size."""
+    return _maximum(tangent, tangent.residual, spread, size)[0]
+
+
+def _maximum(tangent: Tangent, residual: Floats, spread: Spread | None, size: float) -> tuple[Floats, Floats]:
+    """(E, H) pushes and (E, D) what is left, where everything is at its maximum, with weights taken at a residual."""
+    if spread is None or not spread.shared:
+        found = solve(tangent, Normal.of(tangent, residual), None if spread is None else size * spread.root)
+        return found.pushes, residual_of(tangent, found)
+    root = np.broadcast_to(size * spread.root, (len(residual), *spread.root.shape[-2:]))
+    wider = replace(tangent.more(tangent.pushes @ root, np.zeros(root.shape[2])), pushes=tangent.pushes[:, :, :0])
+    solved: Solved = solve(wider, Normal.of(wider, residual), None)
+    return root @ solved.parameters[-root.shape[2] :], residual_of(wider, solved)
