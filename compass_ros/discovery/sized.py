@@ -23,11 +23,14 @@ from compass_ros.discovery.evidence import (
     solve,
 )
 from compass_ros.discovery.settings import A_DECADE, SHOWN
-from compass_ros.types import Floats
+from compass_ros.types import Floats, Ints
 
 ROUNDS = 2
 """How often weights are taken anew, as long as the bound rises by SLIGHT: a tenth of what odds are read to."""
 SLIGHT = 0.1
+FAR = 100.0
+"""Log evidence below the best one from which no weights are taken anew: a budget. What is so far below decides nothing,
+and its bound holds."""
 _NOTHING = 1e-12
 """Size of a discrepancy, as a share of all that is at work, that no recording shows."""
 
@@ -105,7 +108,8 @@ class Reduced:
         squares = squares + np.sum(tangent.own_away**2) + np.sum(tangent.away**2) + normal.constant
         self._squares = squares - np.sum(half[:, :, len(rest) :] ** 2, axis=(0, 1))
         self._determinant = float(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum())
-        self._away = tangent.away
+        self._away, self._acting = tangent.away, np.empty(0, int)
+        self._kept: tuple[Floats, Floats]
         self._rounding = 1 + ROUNDING * np.diagonal(gram[:, : self._p, : self._p].sum(axis=0))
 
     def axes(self, spread: Spread | None) -> Axes:
@@ -115,13 +119,24 @@ class Reduced:
         root = spread.root
         acting = np.flatnonzero(root.any(axis=tuple(i for i in range(root.ndim) if i != root.ndim - 2)))
         turned = np.swapaxes(root[..., acting, :], -2, -1)
-        rows = self._left[:, p + acting]
-        products = turned @ rows[:, :, p + acting] @ np.swapaxes(turned, -2, -1)
-        across = turned @ np.concatenate([rows[:, :, :p], rows[:, :, first:]], axis=2)
+        among, columns = self._of(acting)
+        products = turned @ among @ np.swapaxes(turned, -2, -1)
+        across = turned @ columns
         if spread.shared:
             products, across = products.sum(axis=0, keepdims=True), across.sum(axis=0, keepdims=True)
         values, axes = np.linalg.eigh(products)
         return Axes(np.maximum(values, 0.0), np.swapaxes(axes, -2, -1) @ across)
+
+    def _of(self, acting: Ints) -> tuple[Floats, Floats]:
+        """(E, a, a) products of some pushes with each other and (E, a, p + m) with parameters and residuals.
+
+        Those of the last time are kept: discrepancies of one part and many lengths follow each other.
+        """
+        if not np.array_equal(acting, self._acting):
+            rows = self._left[:, self._p + acting]
+            outer = np.concatenate([rows[:, :, : self._p], rows[:, :, self._first :]], axis=2)
+            self._acting, self._kept = acting, (rows[:, :, self._p + acting], outer)
+        return self._kept
 
     def logs(self, axes: Axes, sizes: Sequence[float] | Floats) -> Floats:
         """(S, m) log evidences."""
@@ -145,24 +160,24 @@ def sized(tangent: Tangent, spreads: Sequence[Spread | None], sizes: Sequence[fl
 
     `sizes`: None for those that recordings would show to be absent (`Axes.shown`).
     """
-    found: list[Sized] = []
-    residual = tangent.residual
+    found: dict[int, Sized] = {}
+    residual, ahead = tangent.residual, list(range(len(spreads)))
     for _ in range(1 + ROUNDS):
-        normal = Normal.of(tangent, residual) if found else tangent.normal
-        reduced = Reduced(tangent, normal)
-        axes = [reduced.axes(spread) for spread in spreads]
-        if not found:
-            asked = [np.ones(1) if s is None else a.shown() if sizes is None else np.array(sizes)
-                     for s, a in zip(spreads, axes, strict=True)]  # fmt: skip
-            found = [Sized(of, np.full(len(of), -np.inf)) for of in asked]
-        before = max(float(one.logs.max()) for one in found)
-        now = [reduced.logs(a, one.sizes)[:, 0] for a, one in zip(axes, found, strict=True)]
-        found = [replace(one, logs=np.maximum(one.logs, of)) for one, of in zip(found, now, strict=True)]
-        best = int(np.argmax([of.max() for of in now]))
-        if now[best].max() < before + SLIGHT:
+        reduced = Reduced(tangent, Normal.of(tangent, residual) if found else tangent.normal)
+        before = max((float(one.logs.max()) for one in found.values()), default=-np.inf)
+        for i in ahead:
+            axes = reduced.axes(spreads[i])
+            if i not in found:
+                asked = np.ones(1) if spreads[i] is None else axes.shown() if sizes is None else np.array(sizes)
+                found[i] = Sized(asked, np.full(len(asked), -np.inf))
+            found[i] = replace(found[i], logs=np.maximum(found[i].logs, reduced.logs(axes, found[i].sizes)[:, 0]))
+        best = max(ahead, key=lambda i: float(found[i].logs.max()))
+        highest = float(found[best].logs.max())
+        if highest < before + SLIGHT:
             break
-        residual = _maximum(tangent, residual, spreads[best], float(found[best].sizes[np.argmax(now[best])]))[1]
-    return found
+        residual = _maximum(tangent, residual, spreads[best], float(found[best].sizes[np.argmax(found[best].logs)]))[1]
+        ahead = [i for i in ahead if found[i].logs.max() > highest - FAR]
+    return [found[i] for i in range(len(spreads))]
 
 
 def mean(tangent: Tangent, spread: Spread | None, size: float) -> Floats:
