@@ -46,10 +46,11 @@ def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats
     if not starts:
         return []
     unbent = _unbent(parent, rows)
-    if unbent is None:
+    if not unbent:
         return []  # a fit to all of these episodes calls for nothing
-    horizons = unbent.horizons
-    runners = [_runner(parent, laws, numbers, rows, unbent) for laws, numbers in starts]
+    horizons = unbent[0].horizons
+    runners = [_runner(parent, laws, numbers, rows, one) for one in unbent for laws, numbers in starts]
+    starts = [*starts] * len(unbent)
     alive = list(range(len(runners)))
     found: dict[int, tuple[Likelihood, Fit]] = {}
     for _ in horizons:
@@ -99,8 +100,8 @@ class _Unbent:
     """Differences there of the strongest, to the first of these."""
 
 
-def _unbent(parent: Hypothesis, rows: Ints) -> _Unbent | None:
-    """The parent's model, from the cell's first guess on. None: the longest horizon calls for nothing.
+def _unbent(parent: Hypothesis, rows: Ints) -> list[_Unbent]:
+    """The parent's model, from the cell's first guess on; none: the longest horizon calls for nothing.
 
     With all that is free in it, to the end: what a fit still lacks, a discrepancy seems to be called for.
     """
@@ -114,10 +115,11 @@ def _unbent(parent: Hypothesis, rows: Ints) -> _Unbent | None:
         found = free(respond(parent.simulator, part, fit))
         if found.log + PRIOR_UNKNOWN > found.alone:
             which = np.setdiff1d(strong.which, held)
-            linear = linearise(part, start(part, values), which, strong.steps[which])
-            return _Unbent(values, strong, horizons[k:], linear)
+            places = [values] if k else [values, fit.point.values]
+            linears = (linearise(part, start(part, place), which, strong.steps[which]) for place in places)
+            return [_Unbent(place, strong, horizons[k:], of) for place, of in zip(places, linears, strict=True)]
         values = fit.point.values
-    return None
+    return []
 
 
 def _runner(
