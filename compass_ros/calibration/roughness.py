@@ -23,7 +23,8 @@ SMALL = 0.3
 DRAWS = 6
 """Random changes that it is averaged over: a budget."""
 MANY = 20
-"""Those that a scatter of likelihoods is read from: a budget, with which it is known to a fifth or so."""
+"""Those that a scatter of likelihoods is read from, a budget: the median absolute deviation has an efficiency of 0.37
+(Rousseeuw and Croux 1993), so it is known to 1 / sqrt(2 x 0.37 x 20) = 0.26 of itself."""
 
 
 def with_rough_starts(likelihood: Likelihood, point: Point) -> Likelihood:

@@ -1,8 +1,8 @@
 """The discrepancy: a Gaussian process over generalised forces and over signals, in time or over the state.
 
-delta_s(t) ~ GP(0, size_s^2 exp(-(t - t')^2 / (2 MEMORY_S^2))): an acceleration in each direction s of what is tracked,
-or an error of each signal s, another one in each episode; or an acceleration that is one function of place and velocity
-in all of them (`kernels.py`).
+delta_s(t) ~ GP(0, size_s^2 exp(-(t - t')^2 / (2 l^2))): an acceleration in each direction s of what is tracked, or one
+along its motion, or an error of each signal s, another one in each episode; or an acceleration that is one function of
+place and velocity in all of them (`kernels.py`). On all sites or signals, or on one of them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from compass_ros.discovery.evidence import Tangent, log_sum
+from compass_ros.discovery.evidence import Tangent, log_mean, log_sum
 from compass_ros.discovery.kernels import KERNELS, shared
 from compass_ros.discovery.response import Response
 from compass_ros.discovery.settings import KEPT, MEMORY_S, RHO, RHO_PRIOR
@@ -70,7 +70,7 @@ class Part:
     @property
     def log(self) -> float:
         """Log evidence."""
-        return _mean(np.array([one.log for one in self.found]))
+        return float(log_mean([one.log for one in self.found]))
 
     @cached_property
     def pushes(self) -> Floats:
@@ -90,7 +90,7 @@ class Free:
     forces: tuple[Part, ...]
     """Of the same with a discrepancy of forces in time: on all sites, and on each of them alone."""
     signals: tuple[Part, ...]
-    """With one of signals in time: of all, and of each encoder or other signal alone."""
+    """With one of signals in time: of all, and of each encoder or other signal alone; none where no signal changes."""
     state: tuple[Part, ...]
     """With forces that are a function of the state, of each kernel on all sites and on each alone."""
 
@@ -98,7 +98,7 @@ class Free:
     def log(self) -> float:
         """With a discrepancy of any of these kinds, equally probable."""
         kinds = (self.forces, self.signals, self.state)
-        return _mean(np.array([_mean(np.array([part.log for part in kind])) for kind in kinds]))
+        return float(log_mean([log_mean([part.log for part in kind]) for kind in kinds if kind]))
 
     @property
     def pushes(self) -> Floats:
@@ -129,11 +129,6 @@ def kinds_of(response: Response) -> list[dict[tuple[TimeOrState, str], list[Spre
         {(kernel, name): shared(response, kernel, sizes) for kernel in KERNELS for name, sizes in forces.items()},
     ]
     return [{key: of for key, of in kind.items() if of} for kind in kinds]
-
-
-def _mean(logs: Floats) -> float:
-    """Logarithm of the mean of exponentials."""
-    return log_sum(logs) - float(np.log(len(logs)))
 
 
 def on_sites(response: Response) -> dict[str, Floats]:
@@ -171,7 +166,7 @@ def with_law(response: Response, sizes: Floats) -> tuple[float, float]:
     logs, each_of = [], iter(found)
     for kind in kinds:
         of_lengths = [next(each_of).logs for _ in kind] or [np.full(len(RHO) - 1, alone.log)]
-        logs.append(np.append(alone.log, np.logaddexp.reduce(of_lengths, axis=0) - np.log(len(of_lengths))))
+        logs.append(np.append(alone.log, log_mean(of_lengths)))
     each = np.array(logs) + np.log(RHO_PRIOR) - np.log(len(logs))
     total = log_sum(each.ravel())
     return total, float(np.exp(each - total).sum(axis=0) @ np.array(RHO))

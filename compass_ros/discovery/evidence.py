@@ -23,7 +23,7 @@ from functools import cached_property
 import numpy as np
 
 from compass_ros.calibration.cost import robust_loss, robust_weight
-from compass_ros.types import Floats
+from compass_ros.types import Floats, Ints
 
 PIECES = 6
 """Into which an episode is cut for its products: a budget. Nine windows of 530 frames of seven signals, 50 moments:
@@ -118,62 +118,46 @@ class Solved:
     """(E, l)"""
     pushes: Floats
     """(E, H) posterior mean of the discrepancy."""
-    precision: Floats
-    """(p, p) of the parameters, everything else integrated out."""
+    determinant: float
+    """What the log evidence has lost by the widths of all posteriors beside their priors."""
 
 
-class Factored:
-    """Parameters, own numbers and a discrepancy factored, for any residuals.
+def solve(tangent: Tangent, normal: Normal, spread: Floats | None) -> Solved:
+    """Log evidence and maximum with a discrepancy `spread` z, z standard normal: (H, q), or (E, H, q) where episodes
+    differ; None: without."""
+    gram, p, own_numbers = normal.gram, tangent.parameters.shape[2], tangent.own.shape[2]
+    mixed = np.zeros((tangent.pushes.shape[2], 0)) if spread is None else spread
+    on = acting(mixed)
+    mixed = np.broadcast_to(mixed[..., on, :], (len(gram), len(on), mixed.shape[-1]))
+    turned = mixed.transpose(0, 2, 1)
+    own, hats, q = slice(p, p + own_numbers), p + own_numbers + on, mixed.shape[2]
+    inner = np.empty((len(gram), own_numbers + q, own_numbers + q))
+    inner[:, :own_numbers, :own_numbers] = gram[:, own, own]
+    inner[:, :own_numbers, own_numbers:] = np.ascontiguousarray(gram[:, own][:, :, hats]) @ mixed
+    inner[:, own_numbers:, :own_numbers] = inner[:, :own_numbers, own_numbers:].transpose(0, 2, 1)
+    inner[:, own_numbers:, own_numbers:] = turned @ np.ascontiguousarray(gram[:, hats][:, :, hats]) @ mixed
+    factor = cholesky(inner + np.eye(own_numbers + q))
+    half = np.linalg.solve(factor, np.concatenate([gram[:, own, :p], turned @ gram[:, hats, :p]], axis=1))
+    taken, whole = np.einsum("eij,eik->jk", half, half), gram[:, :p, :p].sum(axis=0)
+    outer = cholesky(whole - taken + np.diag(1 + ROUNDING * np.diagonal(whole)))
+    determinant = sum(float(np.log(np.diagonal(f, axis1=-2, axis2=-1)).sum()) for f in (factor, outer))
+    last = gram[:, :-1, -1]
+    pulled = np.concatenate([last[:, own] - tangent.own_away, (turned @ last[:, hats, None])[..., 0]], axis=1)
+    back = np.linalg.solve(factor, pulled[..., None])[..., 0]
+    pull = last[:, :p].sum(axis=0) - np.einsum("eip,ei->p", half, back) - tangent.away
+    step = -np.linalg.solve(outer.T, np.linalg.solve(outer, pull))
+    square = gram[:, -1, -1].sum() + np.sum(tangent.own_away**2) + np.sum(tangent.away**2)
+    square += pull @ step - np.sum(back**2)
+    within = -np.linalg.solve(factor.transpose(0, 2, 1), (half @ step + back)[..., None])[..., 0]
+    push = np.zeros((len(gram), tangent.pushes.shape[2]))
+    push[:, on] = (mixed @ within[:, own_numbers:, None])[..., 0]
+    log = float(-0.5 * (square + normal.constant) - determinant)
+    return Solved(log, step, within[:, :own_numbers], push, determinant)
 
-    The discrepancy is `spread` z, z standard normal: (H, q), or (E, H, q) where episodes differ; None: without.
-    """
 
-    def __init__(self, tangent: Tangent, normal: Normal, spread: Floats | None) -> None:
-        gram = normal.gram
-        episodes, p, own_numbers = len(gram), tangent.parameters.shape[2], tangent.own.shape[2]
-        pushes = tangent.pushes.shape[2]
-        mixed = np.zeros((pushes, 0)) if spread is None else spread
-        acting = np.flatnonzero(mixed.any(axis=tuple(i for i in range(mixed.ndim) if i != mixed.ndim - 2)))
-        mixed = mixed[..., acting, :]
-        self._mixed = np.broadcast_to(mixed, (episodes, *mixed.shape[-2:]))
-        self._turned = self._mixed.transpose(0, 2, 1)
-        first = p + own_numbers
-        self._own, self._pushes = slice(p, first), first + acting
-        self._acting, self._all = acting, pushes
-        self._p, self._l, self._tangent, self._constant = p, own_numbers, tangent, normal.constant
-        own, hats, q = self._own, self._pushes, self._mixed.shape[2]
-        inner = np.empty((episodes, own_numbers + q, own_numbers + q))
-        inner[:, :own_numbers, :own_numbers] = gram[:, own, own]
-        inner[:, :own_numbers, own_numbers:] = np.ascontiguousarray(gram[:, own][:, :, hats]) @ self._mixed
-        inner[:, own_numbers:, :own_numbers] = inner[:, :own_numbers, own_numbers:].transpose(0, 2, 1)
-        inner[:, own_numbers:, own_numbers:] = (
-            self._turned @ np.ascontiguousarray(gram[:, hats][:, :, hats]) @ self._mixed
-        )
-        self._factor = cholesky(inner + np.eye(own_numbers + q))
-        across = np.concatenate([gram[:, own, :p], self._turned @ gram[:, hats, :p]], axis=1)
-        self._half = np.linalg.solve(self._factor, across)
-        taken, whole = np.einsum("eij,eik->jk", self._half, self._half), gram[:, :p, :p].sum(axis=0)
-        self.precision = whole - taken + np.diag(1 + ROUNDING * np.diagonal(whole))
-        self._outer = cholesky(self.precision)
-        self.determinant = sum(
-            float(np.log(np.diagonal(f, axis1=-2, axis2=-1)).sum()) for f in (self._factor, self._outer)
-        )
-
-    def solved(self, normal: Normal) -> Solved:
-        """Of the residual of a tangent."""
-        tangent, last = self._tangent, normal.gram[:, :-1, -1]
-        with_own = last[:, self._own] - tangent.own_away
-        pushed = (self._turned @ last[:, self._pushes, None])[..., 0]
-        half = np.linalg.solve(self._factor, np.concatenate([with_own, pushed], axis=1)[..., None])[..., 0]
-        pull = last[:, : self._p].sum(axis=0) - np.einsum("eip,ei->p", self._half, half) - tangent.away
-        step = -np.linalg.solve(self._outer.T, np.linalg.solve(self._outer, pull))
-        square = normal.gram[:, -1, -1].sum() + np.sum(tangent.own_away**2) + np.sum(tangent.away**2)
-        square += pull @ step - np.sum(half**2)
-        within = -np.linalg.solve(self._factor.transpose(0, 2, 1), (self._half @ step + half)[..., None])[..., 0]
-        push = np.zeros((len(within), self._all))
-        push[:, self._acting] = (self._mixed @ within[:, self._l :, None])[..., 0]
-        log = float(-0.5 * (square + self._constant) - self.determinant)
-        return Solved(log, step, within[:, : self._l], push, self.precision)
+def acting(root: Floats) -> Ints:
+    """(a,) pushes that a (..., H, q) discrepancy has."""
+    return np.flatnonzero(root.any(axis=tuple(i for i in range(root.ndim) if i != root.ndim - 2)))
 
 
 def cholesky(matrix: Floats) -> Floats:
@@ -186,16 +170,16 @@ def cholesky(matrix: Floats) -> Floats:
     return np.asarray(np.linalg.cholesky(unit + ROUNDING * np.eye(unit.shape[-1])) * scale[..., :, None])
 
 
-def solve(tangent: Tangent, normal: Normal, spread: Floats | None) -> Solved:
-    """Log evidence with a discrepancy, as `Factored` has it."""
-    return Factored(tangent, normal, spread).solved(normal)
-
-
 def residual_of(tangent: Tangent, solved: Solved) -> Floats:
     """(E, D) what is left where everything is at its maximum."""
     left = tangent.residual + tangent.parameters @ solved.parameters
     left += (tangent.own @ solved.own[:, :, None])[..., 0] + (tangent.pushes @ solved.pushes[:, :, None])[..., 0]
     return np.asarray(left)
+
+
+def log_mean(logs: Sequence[Floats] | Sequence[float] | Floats) -> Floats:
+    """(m,) logarithms of the means of exponentials of (n, m)."""
+    return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(logs)))
 
 
 def log_sum(logs: Floats) -> float:

@@ -25,7 +25,8 @@ FEATURES = 60
 velocity) to 6 (state) higher with 120, and 5 to 17 lower with 30: all alike, so what is compared moves by 2 or so."""
 LENGTHS, FREEDOM = (0.5, 0.2), 3
 """Lengths of the kernel, equally probable, as shares of the spread of what was visited: a form that is smooth over half
-of that, or a place in it; degrees of freedom of its spectrum, 2 x 3/2."""
+of that, or a place in it. Of a field of 0.2 m on pucks forces of place have log evidences of -3162 with a half, -2141
+with a fifth and -2207 with a tenth. Degrees of freedom of its spectrum, 2 x 3/2."""
 
 
 def shared(response: Response, kernel: Kernel, sizes: Floats) -> list[Spread]:

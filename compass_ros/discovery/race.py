@@ -89,7 +89,7 @@ def _at_the_end(parent: Hypothesis, laws: tuple[Attached, ...], likelihood: Like
 
 @dataclass(frozen=True, eq=False)
 class _Unbent:
-    """A model fitted to the longest horizon that calls for nothing more."""
+    """A model where laws begin: fitted to the longest horizon that calls for nothing more, or to the shortest one."""
 
     values: Floats
     """(P,)."""
@@ -101,7 +101,7 @@ class _Unbent:
 
 
 def _unbent(parent: Hypothesis, rows: Ints) -> list[_Unbent]:
-    """The parent's model, from the cell's first guess on; none: the longest horizon calls for nothing.
+    """The parent's model where laws begin, from the cell's first guess on; none: the longest horizon calls for nothing.
 
     With all that is free in it, to the end: what a fit still lacks, a discrepancy seems to be called for.
     """

@@ -15,7 +15,7 @@ from compass_ros.calibration.launches import spreads
 from compass_ros.calibration.least_squares import minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.candidates import Candidate
-from compass_ros.discovery.evidence import log_sum
+from compass_ros.discovery.evidence import log_mean
 from compass_ros.discovery.first_order import SIGMAS, Ranked
 from compass_ros.discovery.hypothesis import SPREADS, Hypothesis, widened
 from compass_ros.discovery.response import Response
@@ -46,7 +46,7 @@ def ranked_scatter(response: Response, candidate: Candidate) -> Ranked:
         )[0].log
         for spread in SPREADS
     ]
-    gain = log_sum(np.array(logs)) - float(np.log(len(logs))) - sized(tangent, [None])[0].log
+    gain = float(log_mean(logs)) - sized(tangent, [None])[0].log
     largest = max(q.high / q.scale for q in candidate.attached.effect.quantities)
     seen = largest * float(np.linalg.norm(columns)) > SIGMAS
     return Ranked(candidate, SPREADS[int(np.argmax(logs))] * modest, columns[:, :, :0], gain, seen)

@@ -17,6 +17,7 @@ from compass_ros.calibration.cost import robust_weight
 from compass_ros.calibration.noise import Noise, correlated
 from compass_ros.calibration.roughness import unsteady
 from compass_ros.discovery.discrepancy import kinds_of
+from compass_ros.discovery.evidence import log_mean
 from compass_ros.discovery.first_order import Ranked
 from compass_ros.discovery.response import Response
 from compass_ros.discovery.settings import PRIOR_UNKNOWN
@@ -70,8 +71,8 @@ def _largest_odds(
     reduced = Reduced(centred, tangent.normal, last, squares)
     (plain,) = reduced.logs(reduced.axes(None), [1.0])
     kinds = [[reduced.axes(one) for part in kind.values() for one in part] for kind in kinds_of(response)]
-    by_kind = [_mean([_mean(reduced.logs(axes, axes.shown())) for axes in kind]) for kind in kinds]
-    best = _mean(by_kind) - plain + PRIOR_UNKNOWN
+    by_kind = [log_mean([log_mean(reduced.logs(axes, axes.shown())) for axes in kind]) for kind in kinds if kind]
+    best = log_mean(by_kind) - plain + PRIOR_UNKNOWN
     p, own = tangent.parameters.shape[2], tangent.own.shape[2]
     narrow = replace(centred, pushes=centred.pushes[:, :, :0])  # a law alone has no discrepancy here
     for one, prior in zip(ranked, priors, strict=True):
@@ -81,11 +82,6 @@ def _largest_odds(
         (with_it,) = reduced.logs(reduced.axes(None), [1.0])
         best = np.maximum(best, with_it - plain + prior)
     return np.asarray(best)
-
-
-def _mean(logs: Sequence[Floats] | Floats) -> Floats:
-    """(m,) logarithms of the mean of exponentials of (n, m)."""
-    return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(logs)))
 
 
 def simulated(response: Response, noise: Noise, rng: np.random.Generator) -> Floats:

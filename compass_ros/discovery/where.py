@@ -22,8 +22,9 @@ def whereabouts(response: Response, free: Free) -> Where:
     """Site, channel, place and kind of a free discrepancy."""
     by_place, by_speed = ([part for part in free.state if part.of == kernel] for kernel in ("place", "velocity"))
     other, best = sorted((max(of, key=lambda part: part.log) for of in (by_place, by_speed)), key=lambda part: part.log)
-    on_one, of_one = (max(parts, key=lambda part: part.log) for parts in (free.forces, free.signals))
-    if of_one.log > max(on_one.log, best.log):
+    on_one = max(free.forces, key=lambda part: part.log)
+    of_one = max(free.signals, key=lambda part: part.log, default=None)
+    if of_one and of_one.log > max(on_one.log, best.log):
         return Where(of_one.name, "all", "sensing")
     depends_on = _depends_on(best, other, on_one)
     pushes = free.pushes if depends_on == "time" else best.pushes

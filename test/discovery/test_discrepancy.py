@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compass_ros.discovery.discrepancy import spread, spreads
+from compass_ros.discovery.discrepancy import free, spread, spreads
 from compass_ros.discovery.sized import sized
+from compass_ros.discovery.where import whereabouts
 from test.discovery.test_weigh import plain
 
 SHARE = 0.1
@@ -39,3 +40,13 @@ def test_a_force_of_any_length_is_nearly_as_probable_as_with_its_own(
     )
     assert min(true - of_wrong, true - of_other) > 10
     assert true - max(asked) < SHARE * min(true - of_wrong, true - of_other)
+
+
+def test_where_no_signal_changes_a_discrepancy_is_one_of_forces(tmp_path: Path) -> None:
+    """As of a joint that hangs still: an error of a signal has the size of what moves, and nothing does."""
+    response = plain(tmp_path, 0).response
+    still = replace(response, unit=response.unit * response.forces)
+    found = free(still)
+    assert not found.signals
+    assert np.isfinite(found.log)
+    assert whereabouts(still, found).channel == "dynamics"

@@ -12,7 +12,7 @@ from compass_ros.calibration.differences import linearise
 from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.candidates import Candidate, candidates
-from compass_ros.discovery.evidence import Factored, Tangent
+from compass_ros.discovery.evidence import Tangent, solve
 from compass_ros.discovery.first_order import FirstOrder, Ranked, best_sizes
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.simulation import Simulator
@@ -62,9 +62,8 @@ def test_a_small_law_of_force_is_found_with_its_numbers(
 
 def _least(tangent: Tangent) -> float:
     """Largest log posterior of a linear model, without determinants."""
-    factored = Factored(tangent, tangent.normal, None)
-    found = factored.solved(tangent.normal)
-    return found.log + factored.determinant
+    found = solve(tangent, tangent.normal, None)
+    return found.log + found.determinant
 
 
 def test_a_law_of_commands_is_rolled_out(tmp_path: Path) -> None:

@@ -76,14 +76,14 @@ def test_a_browser_that_watches_gets_the_last_report(tmp_path: Path, result: Res
 
 def test_the_server_ends_when_the_last_report_has_arrived_whole(tmp_path: Path, result: Result) -> None:
     """More than a socket holds, read slowly: a process that ended before would cut it off."""
-    size, arrived = 64 << 20, 0
+    size, arrived, outlived = 64 << 20, 0, threading.Event()
 
     def slowly() -> None:
         nonlocal arrived
         connection = http.client.HTTPConnection(HOST, live.port, timeout=20)
         connection.request("GET", "/report.html", headers={"Host": f"localhost:{live.port}"})
         answer = connection.getresponse()
-        time.sleep(0.5)
+        outlived.wait(0.5)  # a server that does not wait ends in this time
         while piece := answer.read(1 << 16):
             arrived += len(piece)
 
@@ -95,6 +95,7 @@ def test_the_server_ends_when_the_last_report_has_arrived_whole(tmp_path: Path, 
         reader = threading.Thread(target=slowly)
         reader.start()
     when_ended = arrived
+    outlived.set()
     reader.join()
     assert when_ended > size // 2
     assert arrived == size
