@@ -16,7 +16,7 @@ from compass_ros.reporting.extras import ReportExtras, ResidualMap
 from compass_ros.reporting.numbers import MINUS, percent, plain, probability, unit_text, value_pm, with_unit
 from compass_ros.reporting.residuals import error_curves, left_over
 from compass_ros.reporting.table import STYLE, gap_table, parameter_table
-from compass_ros.reporting.view.explanations import ranked
+from compass_ros.reporting.view.explanations import ranked, sites_named
 from compass_ros.reporting.view.gap import signals
 from compass_ros.reporting.view.missing import ranking
 from compass_ros.reporting.words import (
@@ -46,9 +46,10 @@ def print_diagnosis(result: Result, extras: ReportExtras, console: Console | Non
         out.print(Text(f"  {heading:8} {text}"))
     out.print(gap_table(result))
     out.print(parameter_table(result, extras.truth))
-    for finding in result.mismatch.effects:
-        out.print(_effect(finding))
-        out.print(Text(f"{finding.name} {_evidence(finding)}"))
+    for finding, sites in zip(result.mismatch.effects, sites_named(result.mismatch), strict=True):
+        said = f"{finding.name} on {sites}" if sites else finding.name
+        out.print(_effect(finding, said))
+        out.print(Text(f"{said} {_evidence(finding)}"))
     if result.mismatch.explanations:
         out.print(_explanations(result))
         for row in ranked(result.mismatch):
@@ -81,8 +82,8 @@ def _evidence(finding: EffectFinding) -> str:
     return "; ".join(said)
 
 
-def _effect(finding: EffectFinding) -> Table:
-    table = Table("parameter", "value", "unit", title=Text(finding.name, "bold"), title_justify="left")
+def _effect(finding: EffectFinding, title: str) -> Table:
+    table = Table("parameter", "value", "unit", title=Text(title, "bold"), title_justify="left")
     for name, p in finding.parameters.items():
         table.add_row(Text(name), Text(value_pm(p.value, p.std)), Text(unit_text(p.unit)))
     return table

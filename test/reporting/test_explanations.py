@@ -26,6 +26,7 @@ from compass_ros.types import (
     Verdict,
     Where,
 )
+from test.reporting.conftest import effect
 from test.reporting.test_diagnosis import printed
 
 
@@ -108,6 +109,21 @@ def test_report_and_terminal_show_the_ranking(make_result: Callable[[Verdict], R
         assert f"width:{row.removed}%" in page
         assert row.probability in text
         assert all(f"<code>{name}</code>" in page and name in text for name, _ in row.laws)
+
+
+def test_a_law_on_two_sites_is_told_with_its_site(result: Result) -> None:
+    """What is asymmetric on the elbow and what on the shoulder; another explanation's sites are not theirs."""
+    name = "asymmetric_friction"
+    of = [ExplainedLaw(name, (joint,), effect(name).parameters) for joint in ("elbow", "shoulder")]
+    both = Explanation(tuple(of), 0.9, 0.0, HeldOut(0.030, 0.002, 0.002, "rad"))
+    mismatch = weighed(model({"spring": ("wrist",)}, 0.05, 0.02), both)
+    told = replace(result, mismatch=replace(mismatch, effects=(effect(name), effect(name)), sentence="."))
+    page, text = render(told, ReportExtras()), printed(told, ReportExtras())
+    for joint in ("elbow", "shoulder"):
+        assert f'<p class="effect-name">{name} on {joint}</p>' in page
+        assert f"{name} on {joint} removes" in text
+    without = replace(told, mismatch=replace(told.mismatch, explanations=()))
+    assert f'<p class="effect-name">{name}</p>' in render(without, ReportExtras())
 
 
 def test_names_of_laws_are_no_markup(result: Result) -> None:

@@ -62,6 +62,13 @@ def ranked(mismatch: Mismatch) -> list[Ranked]:
     return rows
 
 
+def sites_named(mismatch: Mismatch) -> list[str]:
+    """Sites of each finding, as the explanation of the same laws has them; empty where none does."""
+    names = [finding.name for finding in mismatch.effects]
+    laws = next((e.laws for e in mismatch.explanations if [law.name for law in e.laws] == names), ())
+    return [_sites(law) for law in laws] or [""] * len(names)
+
+
 def _row(one: Explanation, first: Explanation, kept: bool) -> Ranked:
     unknown = [law.name for law in one.laws] == [UNKNOWN]
     errors = one.held_out

@@ -11,10 +11,11 @@ from compass_ros.reporting.numbers import percent, plain, probability, unit_text
 from compass_ros.types import EffectFinding, Result
 
 
-def effect(finding: EffectFinding) -> dict[str, Any]:
+def effect(finding: EffectFinding, sites: str) -> dict[str, Any]:
     """One fitted effect."""
     return {
         "name": finding.name,
+        "sites": sites,
         "parameters": [
             {"name": name, "value": value_pm(p.value, p.std), "unit": unit_text(p.unit)}
             for name, p in finding.parameters.items()

@@ -7,7 +7,7 @@ from typing import Any
 from compass_ros.reporting.checks import SUMMARY, assess, overall
 from compass_ros.reporting.extras import ReportExtras
 from compass_ros.reporting.numbers import duration, typeset
-from compass_ros.reporting.view.explanations import ranked
+from compass_ros.reporting.view.explanations import ranked, sites_named
 from compass_ros.reporting.view.gap import episodes, factor_table, ladder, signals
 from compass_ros.reporting.view.missing import effect, ranking
 from compass_ros.reporting.view.parameters import graph_rows, parameter, told_rows
@@ -89,7 +89,7 @@ def view(result: Result, extras: ReportExtras) -> dict[str, Any]:
         "with_truth": bool(extras.truth),
         "meaning": VERDICT_MEANING[mismatch.verdict],
         "where": where_rows(mismatch.where, result.unit) if mismatch.where is not None else (),
-        "effects": [effect(e) for e in mismatch.effects],
+        "effects": [effect(e, on) for e, on in zip(mismatch.effects, sites_named(mismatch), strict=True)],
         "explanations": ranked(mismatch),
         "ranking": () if mismatch.explanations else ranking(result, extras.candidates),
         "signals": signals(result),
