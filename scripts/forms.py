@@ -24,7 +24,6 @@ from compass_ros.config import CalibrationConfig
 from compass_ros.discovery.candidates import candidates
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.fits import finished, from_parent, whole
-from compass_ros.discovery.form import left_over
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.neighbours import STEPS, modest, rank
 from compass_ros.discovery.race import race
@@ -119,6 +118,12 @@ def fitted(plain: Hypothesis, ranked: Ranked) -> Hypothesis:
     rows = np.arange(len(plain.likelihood.inputs))
     begun = [from_parent(plain, ranked, rows, STEPS), *race(plain, [(ranked.candidate.parts, modest(ranked))], rows)]
     return finished(whole(plain, min(begun, key=lambda one: one.point.cost)))
+
+
+def left_over(model: Hypothesis) -> float:
+    """What the laws of a model leave above the noise, as a share of what they change: rms of all that is measured."""
+    changed = float(np.linalg.norm(model.bare - model.fit.linear.residual))
+    return float(np.sqrt(model.above_noise)) / changed if changed > 0 else np.inf
 
 
 def table(rows: Sequence[Row]) -> str:

@@ -58,8 +58,10 @@ class Candidate:
 
     @property
     def alone(self) -> bool:
-        """Whether it is on one site; or on all of the cell that it can act on."""
-        return sum(len(part.named) for part in self.parts) == 1
+        """Whether it is on one site, or on pairs of one geom with others; or on all of the cell that it can act on."""
+        named = [set(names) for names in self.attached.named]
+        together = self.attached.effect.paired and bool(set.intersection(*named))
+        return not self.beside and (len(named) == 1 or together)
 
     @property
     def by_force(self) -> bool:

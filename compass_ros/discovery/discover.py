@@ -10,6 +10,7 @@ import numpy as np
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.calibration.refine import Refined
+from compass_ros.calibration.roughness import gains_by_chance
 from compass_ros.discovery.candidates import candidates
 from compass_ros.discovery.finding import Discovery, fit_failed, not_evaluated
 from compass_ros.discovery.first_order import FirstOrder, Ranked
@@ -20,7 +21,7 @@ from compass_ros.discovery.numerics import friction_that_holds, numerics_as_mode
 from compass_ros.discovery.objections import frame_rate, objections
 from compass_ros.discovery.odds import Prior
 from compass_ros.discovery.search import Tell, search
-from compass_ros.discovery.threshold import largest_odds
+from compass_ros.discovery.threshold import by_valley, largest_odds
 from compass_ros.discovery.verdict import Judge
 from compass_ros.errors import DataError
 from compass_ros.simulation import Simulator
@@ -85,8 +86,12 @@ def weigh(
     odds = largest_odds(plain.response, first, priors, noise, alpha, seed)
     threshold = max(float(np.quantile(odds, 1 - alpha)), log((1 - alpha) / alpha))
     tell("fit effects", 0.3)
-    found = search(plain, first, asked, threshold, tell)
+    found = search(plain, first, asked, tell)
     best = max([found.unknown, *found.odds])
+    if best > threshold and simulator.places.touching:
+        gains = gains_by_chance(likelihood, plain.fit) / likelihood.correlation_time
+        found = replace(found, chance=by_valley(gains, len(odds), seed))
+        threshold = max(threshold, float(np.quantile(odds + found.chance, 1 - alpha)))
     if best > threshold:
         if cause := numerics_as_model(plain, best):
             return fit_failed(f"{cause}, which is the simulator's numerics and not physics")

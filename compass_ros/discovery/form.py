@@ -1,21 +1,22 @@
 """Which laws of a model are physics of their own, and which stand for what the form of the others lacks.
 
 A law is a formula, and nature's is another one: a discrepancy in proportion to it, up to `RHO`, is expected of every
-law and is no physics of its own. Where laws leave no more than such a share of what they change, a further one that
-pushes only where they push is that discrepancy, written by other means: unless it takes all that they leave above the
-noise, for the rest of a form is seldom a formula of the library itself. It stays in the simulator, where it is worth
-its evidence, and is not named.
+law and is no physics of its own. A further law that changes no more than such a share of what all of them change, in
+every signal, is that discrepancy, written by other means: unless it takes all that they leave above the noise, for the
+rest of a form is seldom a formula of the library itself. It stays in the simulator, where it is worth its evidence, and
+is not named.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import log
 
 import numpy as np
-from scipy.special import chdtri
 
+from compass_ros.calibration.cost import robust_loss
 from compass_ros.discovery.evidence import log_sum
-from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.hypothesis import Hypothesis, at_noise
 from compass_ros.discovery.odds import Known, Weighed
 from compass_ros.discovery.settings import RHO, SLIGHT
 from compass_ros.simulation.effects import Attached
@@ -44,31 +45,33 @@ def _corrections(known: Known, model: Hypothesis) -> tuple[Attached, ...]:
 
 
 def _less(known: Known, model: Hypothesis) -> Hypothesis | None:
-    """The model without one of its laws that corrects the others, those that leave least; None: without any."""
+    """The model without one of its laws that corrects the others, the one that changes least; None: without any."""
     names = dict.fromkeys(a.effect.name for a in model.laws)
     found: list[tuple[float, Hypothesis]] = []
     for name in names if len(names) > 1 else ():
         own = [a for a in model.laws if a.effect.name == name]
-        others = [a for a in model.laws if a.effect.name != name]
-        pushed = model.sizes_of(own) > 0
-        if not np.any(pushed) or np.any(model.sizes_of(others)[pushed] == 0):
-            continue  # a scatter has no form, and what acts elsewhere corrects nothing
+        if all(a.effect.scattered for a in own):
+            continue  # a scatter has no form
         rest = known.without(model, own)
         if rest and (at_noise(rest[0]) or not at_noise(model)):
-            found.append((left_over(rest[0]), rest[0]))
+            found.append((share_of(model, rest[0]), rest[0]))
     if not found:
         return None
-    left, less = min(found, key=lambda pair: pair[0])
-    return less if left <= max(RHO) else None
+    share, less = min(found, key=lambda pair: pair[0])
+    return less if share <= max(RHO) else None
 
 
-def at_noise(model: Hypothesis) -> bool:
-    """Whether the mean square of what a fit leaves is one that the noise itself exceeds with probability SLIGHT."""
-    independent = model.likelihood.measurements / model.likelihood.correlation_time
-    return bool(model.chi_square * independent <= chdtri(independent, SLIGHT))
-
-
-def left_over(model: Hypothesis) -> float:
-    """What the laws of a model leave above the noise, as a share of what they change: rms of all that is measured."""
-    changed = float(np.linalg.norm(model.bare - model.fit.linear.residual))
-    return float(np.sqrt(model.above_noise)) / changed if changed > 0 else np.inf
+def share_of(model: Hypothesis, rest: Hypothesis) -> float:
+    """What a model predicts otherwise than the rest of it at its own fit, as a share of what all its laws change: the
+    largest over signals, of those where it is worth odds of SLIGHT."""
+    residual, robust, kappa = model.fit.linear.residual, model.fit.robust, model.likelihood.correlation_time
+    worth = robust_loss(rest.fit.linear.residual, robust) - robust_loss(residual, robust)
+    moved, changed = rest.fit.linear.residual - residual, model.bare - residual
+    largest = 0.0
+    for signal in model.simulator.cell.signals:
+        columns = np.arange(signal.columns.start, signal.columns.stop)
+        for one in columns[:, None] if signal.jointed else columns[None]:
+            if 0.5 * float(worth[..., one].sum()) / kappa > -log(SLIGHT):
+                change = float(np.linalg.norm(changed[..., one]))
+                largest = max(largest, float(np.linalg.norm(moved[..., one])) / max(change, 1e-300))
+    return largest

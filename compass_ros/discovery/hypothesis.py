@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import chdtri
 
 from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
@@ -14,6 +15,7 @@ from compass_ros.calibration.residuals import covariance, variances
 from compass_ros.discovery.discrepancy import Free, free, spread, with_law
 from compass_ros.discovery.first_order import WIDTH
 from compass_ros.discovery.response import Response, respond
+from compass_ros.discovery.settings import SLIGHT
 from compass_ros.discovery.zero import Zero, zero
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
@@ -24,8 +26,8 @@ SPREADS = (0.3, 1.0, 3.0, 10.0, 30.0)
 
 
 def name_of(laws: Sequence[Attached]) -> str:
-    """A model by its laws and their sites."""
-    said = (f"{a.effect.name}({', '.join(a.objects)})" if a.objects else a.effect.name for a in laws)
+    """A model by its laws and their sites, each of these once."""
+    said = (f"{a.effect.name}({', '.join(dict.fromkeys(a.objects))})" if a.objects else a.effect.name for a in laws)
     return " + ".join(sorted(said)) or "none"
 
 
@@ -177,6 +179,12 @@ class Hypothesis:
     def rho(self) -> float:
         """Posterior mean of the discrepancy's size, as a share of the laws' own."""
         return self._with_law[1] if self.laws else 0.0
+
+
+def at_noise(model: Hypothesis) -> bool:
+    """Whether the mean square of what a fit leaves is one that the noise itself exceeds with probability SLIGHT."""
+    independent = model.likelihood.measurements / model.likelihood.correlation_time
+    return bool(model.chi_square * independent <= chdtri(independent, SLIGHT))
 
 
 def played(likelihood: Likelihood, simulator: Simulator) -> Likelihood:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from math import log
 
@@ -11,7 +12,7 @@ from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.discrepancy import to_first_order
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.fits import Begun, from_parent, in_common, telling, whole
-from compass_ros.discovery.hypothesis import Hypothesis, name_of
+from compass_ros.discovery.hypothesis import Hypothesis, at_noise, name_of
 from compass_ros.discovery.odds import Known, Prior, Weighed
 from compass_ros.discovery.race import first_of_each, race
 from compass_ros.discovery.scatter import ranked_scatter, with_scatter
@@ -95,6 +96,21 @@ def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str], u
             worth, price = max(odds, least), known.prior.of_laws
             better = [r for r in ranked if refuted or of_less + r.gain + price([r.candidate.name]) > worth]
             widen(known, less, better, unknown > 0)
+
+
+def shape_anew(known: Known) -> None:
+    """Look for the shapes of the best model's law on each of several sites beside the law on the others, where the fit
+    is not at the noise: they were found about a fit that lacked the law on all of them, which may have been bent."""
+    for best, odds in known.ordered[:1]:
+        count = Counter(a.effect.name for a in best.laws)
+        searched = [a for a in best.laws if count[a.effect.name] > 1 and any(q.grid for q in a.effect.quantities)]
+        for attached in [] if at_noise(best) else searched:
+            rest = known.without(best, [attached])
+            again = FirstOrder(rest[0].response).ranked(Candidate(attached))[:1] if rest else []
+            if rest and again and rest[1] + again[0].gain > odds:
+                known.finished.discard(best.name)
+                rows = np.arange(len(best.likelihood.inputs))
+                known.take([whole(rest[0], from_parent(rest[0], again[0], rows, STEPS))])
 
 
 def join(known: Known, candidates: Sequence[Candidate]) -> None:

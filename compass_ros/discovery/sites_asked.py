@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 from compass_ros.cells import Cell
 from compass_ros.cells.signals import Signal
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached, Effect
-from compass_ros.simulation.extents import PairSize
+from compass_ros.simulation.extents import PairSize, alike_pairs
 from compass_ros.simulation.site_kinds import PAIRS, SiteKind
-from compass_ros.simulation.sites import Places, Site
+from compass_ros.simulation.sites import Places, Site, names_of
 from compass_ros.simulation.visited import Visited
 
 PAIRS_ASKED = 12
@@ -23,27 +23,43 @@ class Pairs:
 
     def __init__(self, simulator: Simulator, visited: Visited) -> None:
         self._simulator, self._visited = simulator, visited
-        self._of: dict[SiteKind, list[tuple[Site, PairSize]]] = {}
+        self._of: dict[SiteKind, list[tuple[list[Site], PairSize]]] = {}
 
     def on_pairs(self, effect: Effect) -> Iterator[Attached]:
-        """Each pair alone; where only one touches, a law of all contacts is that one's."""
+        """Each pair alone, those together that differ by which of several alike bodies is in them; where only one
+        touches, a law of all contacts is that one's."""
         for kind in (kind for kind in effect.on if kind in PAIRS):
             if kind not in self._of:
                 self._of[kind] = list(self._found(kind))
             found = self._of[kind]
-            for site, size in found if len(found) > 1 or "contacts" not in effect.on else ():
-                if effect.takes(self._simulator.places.model, site):
-                    yield Attached(effect.at(size), site.names)
+            for sites, size in found if len(found) > 1 or "contacts" not in effect.on else ():
+                if all(effect.takes(self._simulator.places.model, site) for site in sites):
+                    yield Attached(effect.at(size), names_of(sites))
 
-    def _found(self, kind: SiteKind) -> list[tuple[Site, PairSize]]:
-        names = self._visited.touching(PAIRS_ASKED) if kind == "geom_pair" else combinations(self._bodies(), 2)
+    def _found(self, kind: SiteKind) -> list[tuple[list[Site], PairSize]]:
+        names = self._visited.touching() if kind == "geom_pair" else combinations(self._bodies(), 2)
         places = self._simulator.places
         sites = [site for one, other in names if (site := places.pair(kind, one, other)) is not None]
-        sizes = self._visited.pair_sizes(sites)
-        found = list(zip(sites, sizes, strict=True))
         if kind == "geom_pair":
-            return found
-        return sorted((one for one in found if one[1].nearest > 0), key=lambda one: one[1].nearest)[:PAIRS_ASKED]
+            together = list(self._alike(sites).values())[:PAIRS_ASKED]
+            return [(pairs, alike_pairs(self._visited.pair_sizes(pairs))) for pairs in together]
+        sized = zip(([site] for site in sites), self._visited.pair_sizes(sites), strict=True)
+        return sorted((one for one in sized if one[1].nearest > 0), key=lambda one: one[1].nearest)[:PAIRS_ASKED]
+
+    def _alike(self, pairs: Sequence[Site]) -> dict[object, list[Site]]:
+        """Pairs of one geom with geoms of one shape on tracked bodies: what the one is made of, they meet alike."""
+        model, tracked = self._simulator.places.model, self._bodies()
+        out: dict[object, list[Site]] = {}
+        for pair in pairs:
+            shapes = {
+                name: (int(model.geom(name).type[0]), tuple(model.geom(name).size))
+                for name in pair.names
+                if model.body(int(model.body_weldid[model.geom(name).bodyid[0]])).name in tracked
+            }
+            others = [name for name in pair.names if name not in shapes]
+            key = (others[0], *shapes.values()) if len(shapes) == 1 else pair.names
+            out.setdefault(key, []).append(pair)
+        return out
 
     def _bodies(self) -> list[str]:
         """Those that are tracked as bodies."""

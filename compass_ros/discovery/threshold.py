@@ -2,8 +2,7 @@
 
 Recordings are simulated from the plain model, as its fit plus noise of the recordings' own correlation, and judged to
 first order by the same measure as the real ones: the largest log posterior odds of any model against the plain one.
-What first order does not have is added: where the simulator is rough, fits of the same quality end at log likelihoods
-that scatter, and the odds of two of them do so by the root of two more.
+What first order does not have is added: a rough simulator's fits end in one of many valleys (`by_valley`).
 """
 
 from __future__ import annotations
@@ -12,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import median_abs_deviation
 
 from compass_ros.calibration.cost import robust_weight
 from compass_ros.calibration.noise import Noise, correlated
-from compass_ros.calibration.roughness import unsteady
 from compass_ros.discovery.discrepancy import kinds_of
 from compass_ros.discovery.evidence import log_mean
 from compass_ros.discovery.first_order import Ranked
@@ -31,16 +30,28 @@ AT_ONCE = 200
 
 
 def largest_odds(
-    response: Response, ranked: Sequence[Ranked], priors: Sequence[float], noise: Noise, alpha: float, seed: int
+    response: Response,
+    ranked: Sequence[Ranked],
+    priors: Sequence[float],
+    noise: Noise,
+    alpha: float,
+    seed: int,
 ) -> Floats:
     """(BEYOND / alpha,) largest log posterior odds against the plain model, in recordings simulated from it.
 
     `priors`: log prior odds of each ranked law.
     """
     rng, counts = np.random.default_rng(seed), at_once(round(BEYOND / alpha))
-    odds = np.concatenate([_largest_odds(response, ranked, priors, noise, rng, count) for count in counts])
-    scatter = np.sqrt(2) * unsteady(response.likelihood, response.fit)
-    return np.asarray(odds + scatter * np.random.default_rng(seed).standard_normal(len(odds)))
+    return np.concatenate([_largest_odds(response, ranked, priors, noise, rng, count) for count in counts])
+
+
+def by_valley(gains: Floats, count: int, seed: int) -> Floats:
+    """(count,) log odds against the plain model that another one gets by the valley in which its fit ends: at least 0,
+    else normal as the `gains` of the plain model's own fits from other starts are, by their median and its absolute
+    deviation, for one start in another motion altogether would be all of a standard deviation."""
+    drawn = np.random.default_rng(seed).standard_normal(count)
+    spread = float(median_abs_deviation(gains, scale="normal"))
+    return np.maximum(float(np.median(gains)) + spread * drawn, 0.0)
 
 
 def at_once(count: int) -> list[int]:

@@ -271,5 +271,5 @@ def _explained(model: Hypothesis, laws: Sequence[Attached]) -> tuple[ExplainedLa
             continue
         numbers = zip(attached.effect.quantities, values[own], model.std[own], strict=True)
         quantities = {q.name: EffectParameter(float(v), float(e), q.unit) for q, v, e in numbers}
-        out.append(ExplainedLaw(attached.effect.name, attached.objects, quantities))
+        out.append(ExplainedLaw(attached.effect.name, tuple(dict.fromkeys(attached.objects)), quantities))
     return tuple(out)

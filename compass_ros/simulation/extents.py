@@ -137,6 +137,13 @@ def pair_size(kind: SiteKind, one: tuple[BodySize, Path], other: tuple[BodySize,
                     max(a.acceleration, b.acceleration), float(np.hypot(a.speed, b.speed)))  # fmt: skip
 
 
+def alike_pairs(sizes: Sequence[PairSize]) -> PairSize:
+    """Of several pairs of one kind: means of what is finite in all of them, and the least distance."""
+    rows = np.mean([(s.mass, s.extent, s.distance, s.acceleration, s.speed) for s in sizes], axis=0)
+    mass, extent, distance, acceleration, speed = rows.tolist()
+    return PairSize(sizes[0].kind, mass, extent, min(s.nearest for s in sizes), distance, acceleration, speed)
+
+
 def signal_size(site: Site, measured: Floats) -> SignalSize:
     """Of one signal, or of one of its numbers, in (E, F, C) measured rows, NaN where nothing was."""
     return SignalSize(site.kind, site.units[0], float(np.nanstd(measured[..., list(site.columns)], axis=(0, 1)).max()))

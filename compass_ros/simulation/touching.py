@@ -14,15 +14,15 @@ MOMENTS = 200
 of the 2 s that shots take."""
 
 
-def touching(model: mujoco.MjModel, states: Floats, most: int) -> tuple[tuple[str, str], ...]:
-    """The pairs of geoms that touch longest in (E, T, s) full states: what has names, on bodies with name and mass."""
+def touching(model: mujoco.MjModel, states: Floats) -> tuple[tuple[str, str], ...]:
+    """The pairs of geoms that touch in (E, T, s) full states, the longest first: what has names, on named bodies."""
     data, count = mujoco.MjData(model), Counter[tuple[int, int]]()
     for state in states[:, :: max(states.shape[1] // MOMENTS, 1)].reshape(-1, states.shape[2]):
         mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
         mujoco.mj_fwdPosition(model, data)
         count.update({(int(a), int(b)) for a, b in np.sort(data.contact.geom[data.contact.efc_address >= 0])})
     named = [pair for pair, _ in count.most_common() if all(_named(model, geom) for geom in pair)]
-    return tuple((model.geom(a).name, model.geom(b).name) for a, b in named[:most])
+    return tuple((model.geom(a).name, model.geom(b).name) for a, b in named)
 
 
 def _named(model: mujoco.MjModel, geom: int) -> bool:

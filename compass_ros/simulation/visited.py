@@ -80,12 +80,12 @@ class Visited:
             for pair, (one, other) in zip(pairs, bodies, strict=True)
         ]
 
-    def touching(self, most: int) -> tuple[tuple[str, str], ...]:
-        """The pairs of named geoms that touch longest, of bodies that have names too."""
+    def touching(self) -> tuple[tuple[str, str], ...]:
+        """The pairs of named geoms that touch, the longest first, of bodies that have names too."""
         simulator = self._simulator
         if not simulator.places.touching:
             return ()
-        return touching(simulator.written(self._values), self._states[0], most)
+        return touching(simulator.written(self._values), self._states[0])
 
     def signal_size(self, site: Site) -> SignalSize:
         """Of what is measured, as the simulator has it."""

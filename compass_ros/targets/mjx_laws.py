@@ -205,8 +205,9 @@ def _evaluate(term: Term, s: _State) -> tuple[Any, Any, Any]:  # noqa: PLR0911, 
         case "asymmetric":  # extra friction forwards
             x, _, _ = _dry(s, p[0], 0.0)
             return jnp.where(s.vx > 0, x, 0.0), 0.0, 0.0
-        case "load_friction":  # friction as a share of the load
-            return _dry(s, p[0] * jnp.abs(s.load), 0.0)
+        case "load_friction":  # friction as a share of the load, what is more at rest, speed over which that fades
+            more = p[1] * jnp.exp(-s.vx * s.vx / (p[2] * p[2])) if p[1] > 0 else 0.0
+            return _dry(s, (p[0] + more) * jnp.abs(s.load), 0.0)
         case "pulsating":  # cosine and sine amplitude, creep speed, share of the weight, frequency
             turn = 2 * jnp.pi * p[4] * s.time
             return _along(s, (p[0] * jnp.cos(turn) + p[1] * jnp.sin(turn)) * s.weight * p[3], p[2])
@@ -251,10 +252,9 @@ def _evaluate(term: Term, s: _State) -> tuple[Any, Any, Any]:  # noqa: PLR0911, 
             away, turn, soft = s.x - p[1], p[2] * (s.x - p[1]), jnp.where(p[2] == 0, 1.0, p[2])
             pull = jnp.where(p[2] > 0, jnp.sin(turn) / soft, jnp.where(p[2] < 0, jnp.sinh(turn) / soft, away))
             return -p[0] * pull * (1 - p[3] * jnp.maximum(p[2], 0.0) * jnp.cos(turn)), 0.0, 0.0
-        case "cogging":  # cosine and sine amplitude, periods per turn, amplitudes of the second harmonic
-            first, second = p[2] * s.x, 2 * p[2] * s.x
-            once = p[0] * jnp.cos(first) + p[1] * jnp.sin(first)
-            return once + p[3] * jnp.cos(second) + p[4] * jnp.sin(second), 0.0, 0.0
+        case "cogging":  # cosine and sine amplitude, periods per turn, amplitudes of the second and third harmonic
+            waves = ((p[0], p[1], p[2]), (p[3], p[4], 2 * p[2]), (p[5], p[6], 3 * p[2]))
+            return sum(c * jnp.cos(k * s.x) + z * jnp.sin(k * s.x) for c, z, k in waves), 0.0, 0.0
         case "gravity_tilt":  # two angles
             x, y, z = s.mass * _tilted(s.gravity, p[0], p[1])
             return x, y, z

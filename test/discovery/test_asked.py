@@ -105,8 +105,8 @@ def test_adhesion_is_seen_where_a_foot_sticks(tmp_path: Path) -> None:
     near_the_top(ranked(asked.foot(tmp_path), asked.lifts(6), "adhesion", pair, {"force": 10.0}), "adhesion", pair)
 
 
-FAINT = ("share", "hysteresis", "windup", "windup_force")
-"""Numbers of which such motions say little."""
+FAINT = ("share", "hysteresis", "windup", "windup_force", "speed")
+"""Numbers of which such motions say little; nothing of the speed at which what is not there fades."""
 
 
 @pytest.mark.slow

@@ -152,6 +152,20 @@ def test_on_the_table_every_law_is_asked_as_ever(name: str) -> None:
     assert found == ([] if absent else pucks if kind.moves else walls if kind.on_walls else [()])
 
 
+def test_alike_bodies_meet_a_geom_alike() -> None:
+    """What both pucks touch is one site, whichever puck it is; two pucks are another one."""
+    simulator, rng = table_simulator(), np.random.default_rng(0)
+    ranges = [(-0.25, 0.25), (0.0, 0.1), (-0.8, 0.8), (0.4, 1.2)]
+    inputs = np.column_stack([rng.uniform(low, high, 8) for low, high in ranges])
+    asked_of = candidates(simulator, simulator.defaults, inputs, np.tile(np.linspace(0, 2.5, 60), (8, 1)))
+    found = [c for c in asked_of if c.name == "rate_dependent_restitution" and c.objects]
+    of_both = [c for c in found if {"puck1", "puck2"} < set(c.objects)]
+    assert {c.objects[0] for c in of_both} > {"pusher"}
+    assert all(c.alone and len(c.attached.named) == 2 for c in of_both)
+    geoms = [(set(c.objects) - {"puck1", "puck2"} or {"pucks"}).pop() for c in found]
+    assert len(geoms) == len(set(geoms))
+
+
 @pytest.mark.parametrize(
     ("gravity", "load", "on_table", "lying"),
     [

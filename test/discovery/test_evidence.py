@@ -79,7 +79,7 @@ def test_the_maximum_is_that_of_least_squares() -> None:
 
 @pytest.mark.parametrize("kind", ["none", "alike", "by episode", "shared"])
 def test_many_residuals_and_sizes_at_once_are_as_each_alone(kind: str) -> None:
-    tangent = drawn(7)
+    tangent = drawn(19)
     rng = np.random.default_rng(8)
     others = rng.normal(size=(4, EPISODES, ROWS))
     root = rng.normal(size=(PUSHES, 5) if kind == "alike" else (EPISODES, PUSHES, 5))
@@ -103,7 +103,7 @@ def _alone(tangent: Tangent, spread: Spread | None, size: float) -> float:
 @pytest.mark.parametrize("shared", [False, True])
 def test_the_least_size_is_one_that_its_absence_would_show(shared: bool) -> None:
     """Odds of 99 against it, in the mean of recordings that are noise."""
-    tangent = drawn(17)
+    tangent = drawn(19)
     none = np.zeros((EPISODES, ROWS, 0))
     tangent = replace(
         tangent, parameters=none, own=none, away=np.zeros(0), own_away=np.zeros((EPISODES, 0)), robust=1e9
@@ -116,8 +116,24 @@ def test_the_least_size_is_one_that_its_absence_would_show(shared: bool) -> None
     assert np.mean(against) == pytest.approx(np.log(99), abs=4 * float(np.std(against)) / 20)
 
 
+def test_pushes_that_grow_beyond_all_digits_take_no_more_than_there_is() -> None:
+    """About an unstable motion each push grows from its moment on, to 1e15 sigma: all of them along one direction."""
+    rows, count = 400, 50
+    later = np.arange(rows)[:, None] - np.linspace(0, rows, count, endpoint=False)
+    pushes = np.where(later > 0, np.exp(np.log(1e15) * np.maximum(later, 0) / rows) + np.maximum(later, 0), 0.0)
+    rng = np.random.default_rng(19)
+    parameters = rng.normal(size=(1, rows, PARAMETERS)) * pushes[:, :1] ** 0.3
+    nothing = np.zeros((1, rows, 0))
+    tangent = Tangent(
+        rng.normal(size=(1, rows)), parameters, nothing, pushes[None], np.zeros(PARAMETERS), np.zeros((1, 0)), WIDE, 1.0
+    )
+    (free,) = sized(tangent, [Spread(np.eye(count))], [1e3])
+    assert np.isfinite(free.log)
+    assert free.log < 0
+
+
 def test_a_parameter_that_says_nothing_costs_nothing() -> None:
-    tangent = drawn(9)
+    tangent = drawn(19)
     wider = tangent.more(np.zeros((EPISODES, ROWS, 2)), np.zeros(2))
     assert solve(wider, wider.normal, None).log == pytest.approx(solve(tangent, tangent.normal, None).log, abs=1e-9)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -41,3 +42,12 @@ def explaining(models: Mapping[str, float]) -> list[str]:
 )
 def test_what_is_left_open(models: dict[str, float], left_open: list[str]) -> None:
     assert explaining(models) == left_open
+
+
+def test_odds_that_chance_may_give_leave_the_plain_model_its_share() -> None:
+    """One model at log odds of 5: 1 / (1 + e^5) where nothing is rough; each gain by chance is as probable."""
+    found = Found(cast(Any, None), -800.0, (cast(Any, None),), (5.0,), ())
+    assert found.probabilities[0] == pytest.approx(1 / (1 + np.exp(5.0)))
+    rough = replace(found, chance=np.array([0.0, 5.0, 40.0]))
+    assert rough.probabilities[0] == pytest.approx((1 / (1 + np.exp(5.0)) + 0.5 + 1.0) / 3)
+    assert sum(rough.probabilities[:2]) + rough.probabilities[2].sum() == pytest.approx(1.0)

@@ -98,8 +98,7 @@ def test_noise_seldom_exceeds_the_threshold(tmp_path: Path) -> None:
         assert rarer.shape == (round(BEYOND / alpha),)
         assert np.allclose(rarer[:200], odds[: len(rarer)])
         assert np.sum(rarer > np.quantile(rarer, 1 - alpha)) == BEYOND
-    found = search(model, first, asked, max(float(np.quantile(odds, 0.99)), 0.0), lambda *_: True)
-    assert not found.models
+    found = search(model, first, asked, lambda *_: True)
     assert found.probabilities[0] > 0.9
 
 

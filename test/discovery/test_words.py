@@ -24,7 +24,8 @@ def test_every_amplitude_is_said_and_shapes_that_are_known_but_for_a_region() ->
     assert words == "swirl, strength 0.25 +- 0.01 m/s^2, tail 0.25 +- 0.01"
 
     cogging = Attached(EFFECTS["cogging"], ("j",))
-    given = {"cosine": (0.0064, 2e-5), "sine": (0.0, 1e-5), "cosine_2": (0.0, 1e-5), "sine_2": (0.0, 1e-5)}
+    given = {f"{wave}{n}": (0.0, 1e-5) for wave in ("cosine", "sine") for n in ("", "_2", "_3")}
+    given["cosine"] = (0.0064, 2e-5)
     for std, sure in ((0.02, True), (20.0, False)):
         known = given | {"periods": (42.0, std)}
         found = {q.name: EffectParameter(*known[q.name], q.unit) for q in cogging.effect.quantities}

@@ -40,7 +40,7 @@ SMOOTH: tuple[tuple[str, tuple[str, ...], tuple[float, ...]], ...] = (
     ("quadratic_drag", ("elbow",), (0.1,)),
     ("spring", ("elbow",), (1.5, 0.2, 0.7, 0.8)),
     ("spring", ("shoulder",), (0.5, -0.2, -0.4, 0.8)),
-    ("cogging", ("shoulder",), (0.2, -0.1, 6.0, 0.05, 0.1)),
+    ("cogging", ("shoulder",), (0.2, -0.1, 6.0, 0.05, 0.1, -0.03, 0.06)),
     ("gravity_tilt", ("upper", "lower"), (0.05, -0.03)),
     ("payload", ("lower",), (0.4, 0.008, 0.004, -0.04)),
 )
@@ -48,7 +48,7 @@ DRY: tuple[tuple[str, tuple[str, ...], tuple[float, ...]], ...] = (
     ("coulomb_friction", ("elbow",), (0.1,)),
     ("stribeck_friction", ("shoulder",), (0.1, 0.3, 0.0)),
     ("asymmetric_friction", ("elbow",), (0.05,)),
-    ("load_dependent_friction", ("shoulder",), (0.05,)),
+    ("load_dependent_friction", ("shoulder",), (0.05, 0.03, 0.4)),
 )
 TABLE: tuple[tuple[str, tuple[str, ...], tuple[float, ...]], ...] = (
     ("fan_field", ("puck1", "puck2"), (0.4, -0.1, 0.05, 0.12, 0.5)),

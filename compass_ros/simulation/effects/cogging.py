@@ -1,8 +1,8 @@
 """A torque that repeats with the angle, as between the magnets and teeth of a motor or from the teeth of a gear.
 
-F = cosine cos(periods q) + sine sin(periods q) + cosine_2 cos(2 periods q) + sine_2 sin(2 periods q), a torque;
-`periods` per turn. Source: the first two harmonics of the cogging torque (Hanselman 2003, ch. 5); behind a gear
-`periods` need be no whole number.
+F = cosine cos(periods q) + sine sin(periods q) + cosine_2 cos(2 periods q) + sine_2 sin(2 periods q) + cosine_3 cos(3
+periods q) + sine_3 sin(3 periods q), a torque; `periods` per turn. Source: the first three harmonics of the cogging
+torque (Hanselman 2003, ch. 5); behind a gear `periods` need be no whole number.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ def _forces(numbers: Floats, context: Context) -> tuple[Term, ...]:
 def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
     """Of less than a period within the travel (uniform: sqrt(12) spreads) one sees a constant push or a spring.
 
-    Harmonics fall: half as much is expected of the second, so that it is not taken for the first of half as many teeth.
+    Harmonics fall: half as much is expected of the second and a third of the third, so that these are not taken for the
+    first of fewer teeth.
     """
     once = max(1.0, 2 * np.pi / (np.sqrt(12) * size.spread))
     most, scale = LARGEST * size.force, MODEST * size.force
@@ -37,6 +38,8 @@ def _on_joint(size: JointSize) -> tuple[Quantity, ...]:
         Quantity("periods", "1", once, _FINEST * once, once, amplitude=False, start=4 * once, grid=_GRID),
         Quantity("cosine_2", size.force_unit, -most / 2, most / 2, scale / 2, later=True),
         Quantity("sine_2", size.force_unit, -most / 2, most / 2, scale / 2, later=True),
+        Quantity("cosine_3", size.force_unit, -most / 3, most / 3, scale / 3, later=True),
+        Quantity("sine_3", size.force_unit, -most / 3, most / 3, scale / 3, later=True),
     )
 
 

@@ -1,7 +1,9 @@
-"""An encoder whose disc is off the centre of its shaft.
+"""An encoder whose disc or magnet is off the centre of its shaft.
 
-observed = q + cosine cos(q) + sine sin(q), q the angle: an error that repeats once a turn.
-Source: first harmonic of an eccentric scale (Ellin and Dolsak 2008), e / r for an eccentricity e of a disc of radius r.
+observed = q + cosine (cos(q) - 1) + sine sin(q) + cosine_2 (cos(2 q) - 1) + sine_2 sin(2 q), q the angle: an error that
+repeats with the turn, and none at the angle 0, where its zero was set (another one is `offset`, or a number of the
+cell). Source: first harmonic of an eccentric scale (Ellin and Dolsak 2008), e / r for an eccentricity e of a disc of
+radius r; the second one is that of two heads or fields that are not square, or of unequal gain.
 """
 
 from __future__ import annotations
@@ -16,11 +18,12 @@ from compass_ros.types import Floats
 
 
 def _sensing(sample: Sample, numbers: Floats, context: Context) -> Sample:
-    cosine, sine = numbers[:, None, :1], numbers[:, None, 1:]
+    cosine, sine, cosine_2, sine_2 = (numbers[:, None, i : i + 1] for i in range(4))
 
     def eccentric(time: Floats) -> Floats:
         seen = sample(time)
-        return np.asarray(seen + cosine * np.cos(seen) + sine * np.sin(seen))
+        once = cosine * (np.cos(seen) - 1) + sine * np.sin(seen)
+        return np.asarray(seen + once + cosine_2 * (np.cos(2 * seen) - 1) + sine_2 * np.sin(2 * seen))
 
     return eccentric
 
@@ -31,10 +34,17 @@ def _unable(model: mujoco.MjModel, site: Site) -> str:
     return "it is not one angle" + (f"; name one of its {len(site.units)} numbers" if len(site.units) > 1 else "")
 
 
+_MOST, _SCALE = 0.2, 0.1 * MODEST
+
 EFFECT = Effect(
     name="eccentricity",
     channel="sensing",
-    quantities=(Quantity("cosine", "rad", -0.2, 0.2, 0.1 * MODEST), Quantity("sine", "rad", -0.2, 0.2, 0.1 * MODEST)),
+    quantities=(
+        Quantity("cosine", "rad", -_MOST, _MOST, _SCALE),
+        Quantity("sine", "rad", -_MOST, _MOST, _SCALE),
+        Quantity("cosine_2", "rad", -_MOST / 2, _MOST / 2, _SCALE / 2, later=True),
+        Quantity("sine_2", "rad", -_MOST / 2, _MOST / 2, _SCALE / 2, later=True),
+    ),
     sentence="an error of the encoder that repeats once a turn",
     on=("encoder",),
     sensing=_sensing,

@@ -233,11 +233,14 @@ static Force evaluate(const Term* term, const State* s) {
     }
     case ASYMMETRIC:       // p: extra friction forwards
       return (s->way ? s->way : s->vx) > 0 ? along(s, p[0], 0) : (Force){0, 0, 0};
-    case LOAD_FRICTION:    // p: friction as a share of the load
-      return along(s, p[0] * fabs(s->load), 0);
-    case COGGING: {        // p: cosine and sine amplitude, periods per turn, amplitudes of the second harmonic
-      double c = cos(p[2] * s->x), z = sin(p[2] * s->x);
-      return (Force){p[0] * c + p[1] * z + p[3] * (2 * c * c - 1) + p[4] * 2 * z * c, 0, 0};
+    case LOAD_FRICTION: {  // p: friction as a share of the load, what is more at rest, speed over which that fades
+      double more = p[1] > 0 ? p[1] * exp(-s->speed * s->speed / (p[2] * p[2])) : 0;
+      return along(s, (p[0] + more) * fabs(s->load), 0);
+    }
+    case COGGING: {        // p: cosine and sine amplitude, periods per turn, amplitudes of the second and third harmonic
+      double c = cos(p[2] * s->x), z = sin(p[2] * s->x), twice = 2 * c * c - 1;
+      double more = p[5] * c * (2 * twice - 1) + p[6] * z * (2 * twice + 1);
+      return (Force){p[0] * c + p[1] * z + p[3] * twice + p[4] * 2 * z * c + more, 0, 0};
     }
     case GRAVITY_TILT: {   // p: two angles
       Force f = tilted(s->gravity, p[0], p[1]);

@@ -203,16 +203,19 @@ def test_a_gear_loses_its_share_of_what_drives_it(torque: float, coefficient: fl
     assert data.qvel[0] == pytest.approx(0.2 * torque * (1 - coefficient) / INERTIA, rel=1e-3)
 
 
-def test_friction_by_load_knows_the_load_of_this_very_moment() -> None:
-    """Of a servo, whose torque changes with the angle: against the formula integrated. No load, no friction."""
+@pytest.mark.parametrize("at_rest", [0.0, 0.4])
+def test_friction_by_load_knows_the_load_of_this_very_moment(at_rest: float) -> None:
+    """Of a servo, whose torque changes with the angle, against the formula integrated; higher when slow or not. No
+    load, no friction."""
     model = axis('<position name="s" joint="axis" kp="4" kv=".1"/>')
 
     def formula(t: float, q: Floats, v: Floats) -> Floats:
         servo = 4 * (1.0 - q) - 0.1 * v
-        return np.asarray((servo - 0.2 * np.abs(servo) * np.tanh(v / 1e-3)) / INERTIA)
+        share = 0.2 + at_rest * np.exp(-((v / 1.5) ** 2))
+        return np.asarray((servo - share * np.abs(servo) * np.tanh(v / 1e-3)) / INERTIA)
 
-    found = swung(model, laws(("load_dependent_friction", (0.2,), "axis")), (0.0, 0.0), 0.3, told=1.0)
-    np.testing.assert_allclose(found, flown(formula, np.zeros(1), np.zeros(1), 0.3, 600), rtol=2e-3)
+    found = swung(model, laws(("load_dependent_friction", (0.2, at_rest, 1.5), "axis")), (0.0, 0.0), 0.3, told=1.0)
+    np.testing.assert_allclose(found, flown(formula, np.zeros(1), np.zeros(1), 0.3, 600), rtol=3e-3)
     assert swung(axis(), laws(("load_dependent_friction", (0.9,), "axis")), (0.0, 3.0), 0.3)[1] == 3.0
 
 
@@ -220,9 +223,10 @@ def test_friction_by_load_knows_the_load_of_this_very_moment() -> None:
 def test_cogging_repeats_with_the_angle(periods: float) -> None:
     def formula(t: float, q: Floats, v: Floats) -> Floats:
         once = 0.3 * np.cos(periods * q) - 0.2 * np.sin(periods * q)
-        return np.asarray((once + 0.1 * np.cos(2 * periods * q) + 0.15 * np.sin(2 * periods * q)) / INERTIA)
+        twice = 0.1 * np.cos(2 * periods * q) + 0.15 * np.sin(2 * periods * q)
+        return np.asarray((once + twice - 0.1 * np.cos(3 * periods * q) + 0.05 * np.sin(3 * periods * q)) / INERTIA)
 
-    numbers = (0.3, -0.2, periods, 0.1, 0.15)
+    numbers = (0.3, -0.2, periods, 0.1, 0.15, -0.1, 0.05)
     found = swung(axis(), laws(("cogging", numbers, "axis")), (0.2, 5.0), 0.5)
     np.testing.assert_allclose(found, flown(formula, np.array([0.2]), np.array([5.0]), 0.5, 600), rtol=1e-3)
     turned = swung(axis(), laws(("cogging", numbers, "axis")), (0.2 + 2 * np.pi / periods, 5.0), 0.5)

@@ -148,7 +148,17 @@ def test_an_eccentric_disc_reads_as_geometry_has_it(turns: float) -> None:
     centre = e * np.exp(1j * (angle + 0.4)) + f * np.exp(1j * angle)
     read = angle - np.unwrap(np.angle(1.0 - centre))  # the disc's own angle under the head
     cosine, sine = e * np.sin(0.4), e * np.cos(0.4) + f
-    np.testing.assert_allclose(encoder("eccentricity", (cosine, sine), angle[:, None])[:, 0], read, atol=2e-7)
+    seen = encoder("eccentricity", (cosine, sine, 0.0, 0.0), angle[:, None])
+    np.testing.assert_allclose(seen[:, 0] + cosine, read, atol=2e-7)  # its zero is set anew
+
+
+@pytest.mark.parametrize("gain", [1e-3, -2e-3])
+def test_unequal_channels_of_a_resolver_err_twice_a_turn(gain: float) -> None:
+    """The arctangent of a sine that is too large and of a cosine that is not: gain / 2 sin(2 q) to first order."""
+    angle = np.linspace(-np.pi + 0.1, np.pi - 0.1, 200)
+    read = np.arctan2((1 + gain) * np.sin(angle), np.cos(angle))
+    seen = encoder("eccentricity", (0.0, 0.0, 0.0, gain / 2), angle[:, None])
+    np.testing.assert_allclose(seen[:, 0], read, atol=gain**2)
 
 
 @pytest.mark.parametrize(
