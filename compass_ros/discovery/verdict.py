@@ -17,7 +17,7 @@ from compass_ros.discovery.numerics import with_numerics
 from compass_ros.discovery.search import Found
 from compass_ros.discovery.settings import SLIGHT
 from compass_ros.discovery.where import whereabouts
-from compass_ros.discovery.words import DEPENDS, corrected, errors, missing, place, value_of, where_of
+from compass_ros.discovery.words import DEPENDS, corrected, errors, missing, place, values_of, where_of
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.simulation.replay import rms_distance
@@ -156,10 +156,7 @@ class Judge:
         lacks = missing(best.physics, numbers, self.simulator.places)
         if verdict == "ambiguous":
             lacks = "the simulator lacks one of these: " + "; ".join(dict.fromkeys(name_of(m.physics) for m in models))
-        names = [a.effect.name for a in best.physics]
-        sizes = "; ".join(
-            value_of(f, a, names.count(a.effect.name) > 1) for f, a in zip(findings, best.physics, strict=True)
-        )
+        sizes = values_of(findings, best.physics)
         sizes = f"the most probable is {sizes}" if verdict == "ambiguous" else sizes
         sizes += corrected(best.corrections)
         gaps = errors(self._before, after, self._floor, self.simulator.unit)
@@ -260,7 +257,7 @@ def _on(where: Where, sites: Sequence[Site], names: Sequence[str]) -> Where:
     kinds = {word_of(site.kind) for site in sites}
     kind = kinds.pop() if len(kinds) == 1 else None
     phase = GENERAL.get(where.phase, where.phase)
-    return replace(where, phase=phase, site_kind=kind, site="+".join(names) or "all")
+    return replace(where, phase=phase, site_kind=kind, site="+".join(dict.fromkeys(names)) or "all")
 
 
 def _explained(model: Hypothesis, laws: Sequence[Attached]) -> tuple[ExplainedLaw, ...]:

@@ -29,6 +29,8 @@ OF_JOINTS = IN_WORDS | {"strike": "In the drive", "free": "In the motion", "wall
 """The same where nothing slides on a table."""
 
 
+SEVERAL = 2
+"""Sites of one law that a sentence says one by one; of more a report has a list."""
 _REGION = ("centre_x", "centre_y", "radius", "core")
 """Shapes that say where on a table an effect is, which the place in words says."""
 
@@ -126,6 +128,24 @@ def value_of(finding: EffectFinding, attached: Attached, told: bool) -> str:
         return f"{finding.name}{on}, {', '.join(open_)} (shows only together with other numbers)"
     rest = f" (not told from 0: {', '.join(open_)})" if open_ else ""
     return f"{finding.name}{on}, {', '.join(sure + shapes)}{rest}{of_chance}"
+
+
+def values_of(findings: Sequence[EffectFinding], laws: Sequence[Attached]) -> str:
+    """What all laws come to; of one on more than two sites how far its amplitudes reach: 'cogging, sine -0.1 to 0.3 N m
+    on 4 sites'."""
+    out = []
+    for name in dict.fromkeys(f.name for f in findings):
+        own = [(f, a) for f, a in zip(findings, laws, strict=True) if f.name == name]
+        if len(own) <= SEVERAL:
+            out += [value_of(f, a, len(own) > 1) for f, a in own]
+            continue
+        reach = []
+        for quantity in (q for q in own[0][1].effect.quantities if q.amplitude):
+            values = [f.parameters[quantity.name].value for f, _ in own]
+            unit = "" if quantity.unit == "1" else f" {quantity.unit}"
+            reach.append(f"{quantity.name} {min(values):.3g} to {max(values):.3g}{unit}")
+        out.append(f"{name}, {', '.join(reach)} on {len(own)} sites")
+    return "; ".join(out)
 
 
 def corrected(laws: Sequence[Attached]) -> str:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from compass_ros.discovery.words import place, value_of, where_of
+from compass_ros.discovery.words import place, value_of, values_of, where_of
 from compass_ros.simulation.effects import EFFECTS, Attached, effect
 from compass_ros.simulation.extents import unit_body
+from compass_ros.simulation.sizes import unit_joint
 from compass_ros.types import EffectFinding, EffectParameter, Evidence
 
 
@@ -71,3 +72,19 @@ def test_several_sites_are_listed() -> None:
     load = Attached(EFFECTS["payload"], ("tool",))
     numbers = np.array([q.start for q in load.effect.quantities])
     assert place(where_of([load], numbers, ("a", "b", "c")), flat=False) == "In the motion of tool"
+
+
+def test_a_law_on_many_sites_is_said_by_how_far_it_reaches() -> None:
+    law = effect("viscous_drag").at(unit_joint("hinge"))
+    (quantity,) = law.quantities
+
+    def found(value: float) -> EffectFinding:
+        parameters = {quantity.name: EffectParameter(value, 0.01, quantity.unit)}
+        return EffectFinding(law.name, parameters, Evidence(0.9, 100.0, 0.001), ())
+
+    laws, findings = [Attached(law, (name,)) for name in "abc"], [found(v) for v in (0.3, -0.1, 0.2)]
+    unit = quantity.unit
+    assert values_of(findings, laws) == f"viscous_drag, {quantity.name} -0.1 to 0.3 {unit} on 3 sites"
+    first = f"viscous_drag of a, {quantity.name} 0.3 +- 0.01 {unit}"
+    assert values_of(findings[:2], laws[:2]) == f"{first}; viscous_drag of b, {quantity.name} -0.1 +- 0.01 {unit}"
+    assert values_of(findings[:1], laws[:1]) == first.replace(" of a", "")
