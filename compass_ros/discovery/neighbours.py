@@ -24,8 +24,10 @@ from compass_ros.types import Floats
 
 RACED = 4
 """Neighbours that are fitted from their parent: a budget."""
-STEPS = 4
-"""Gauss-Newton steps of each fit from its parent: a budget."""
+STEPS = 20
+"""Gauss-Newton steps of each fit from its parent, which ends before where one gains less than 1: a budget. What is
+linear is there in four, what has shapes is not: a balance spring (`kinova3` 1060001) is 74 of log likelihood behind an
+error of its encoder after four, 28 after eight, 12 after fourteen, in 7 s where four take 3."""
 
 
 def rank(first: FirstOrder, candidates: Sequence[Candidate]) -> list[Ranked]:
