@@ -22,8 +22,11 @@ SMALL = 0.3
 DRAWS = 6
 """Random changes that it is averaged over: a budget."""
 REFITS = 8
-"""Fits that show what another start is worth, and the steps of each: a budget."""
+"""Fits that show what another start is worth, a budget: the median absolute deviation has an efficiency of 0.37
+(Rousseeuw and Croux 1993), so it is known to 1 / sqrt(2 x 0.37 x 8) = 0.41 of itself."""
 STEPS = 4
+"""Gauss-Newton steps of each, a budget: starts on a bar that are 98 to 381 worse (`gains_by_chance`) are at most 11.4
+worse after four."""
 
 
 def with_rough_starts(likelihood: Likelihood, point: Point) -> Likelihood:

@@ -49,6 +49,12 @@ class Signal:
         return slice(self.first, self.first + self.size)
 
     @property
+    def together(self) -> tuple[tuple[int, ...], ...]:
+        """Columns that say together where one thing is: of joints each alone."""
+        columns = tuple(range(self.first, self.first + self.size))
+        return tuple((column,) for column in columns) if self.jointed else (columns,)
+
+    @property
     def numbers(self) -> tuple[str, ...]:
         """(D,) what its numbers are called."""
         return self.of or self.at if self.jointed else NUMBERS[self.quantity]

@@ -16,7 +16,7 @@ import numpy as np
 
 from compass_ros.calibration.cost import robust_loss
 from compass_ros.discovery.evidence import log_sum
-from compass_ros.discovery.hypothesis import Hypothesis, at_noise
+from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.odds import Known, Weighed
 from compass_ros.discovery.settings import RHO, SLIGHT
 from compass_ros.simulation.effects import Attached
@@ -53,7 +53,7 @@ def _less(known: Known, model: Hypothesis) -> Hypothesis | None:
         if all(a.effect.scattered for a in own):
             continue  # a scatter has no form
         rest = known.without(model, own)
-        if rest and (at_noise(rest[0]) or not at_noise(model)):
+        if rest and (rest[0].at_noise or not model.at_noise):
             found.append((share_of(model, rest[0]), rest[0]))
     if not found:
         return None
@@ -68,10 +68,8 @@ def share_of(model: Hypothesis, rest: Hypothesis) -> float:
     worth = robust_loss(rest.fit.linear.residual, robust) - robust_loss(residual, robust)
     moved, changed = rest.fit.linear.residual - residual, model.bare - residual
     largest = 0.0
-    for signal in model.simulator.cell.signals:
-        columns = np.arange(signal.columns.start, signal.columns.stop)
-        for one in columns[:, None] if signal.jointed else columns[None]:
-            if 0.5 * float(worth[..., one].sum()) / kappa > -log(SLIGHT):
-                change = float(np.linalg.norm(changed[..., one]))
-                largest = max(largest, float(np.linalg.norm(moved[..., one])) / max(change, 1e-300))
+    for one in (list(columns) for signal in model.simulator.cell.signals for columns in signal.together):
+        if 0.5 * float(worth[..., one].sum()) / kappa > -log(SLIGHT):
+            change = float(np.linalg.norm(changed[..., one]))
+            largest = max(largest, float(np.linalg.norm(moved[..., one])) / max(change, 1e-300))
     return largest

@@ -27,7 +27,7 @@ SPREADS = (0.3, 1.0, 3.0, 10.0, 30.0)
 
 def name_of(laws: Sequence[Attached]) -> str:
     """A model by its laws and their sites, each of these once."""
-    said = (f"{a.effect.name}({', '.join(dict.fromkeys(a.objects))})" if a.objects else a.effect.name for a in laws)
+    said = (f"{a.effect.name}({', '.join(a.distinct)})" if a.objects else a.effect.name for a in laws)
     return " + ".join(sorted(said)) or "none"
 
 
@@ -61,6 +61,12 @@ class Hypothesis:
     def above_noise(self) -> float:
         """Squared residual above what noise alone leaves [sigma^2]."""
         return max(2 * self.fit.point.cost - self.likelihood.measurements, 0.0)
+
+    @property
+    def at_noise(self) -> bool:
+        """Whether the mean square of what its fit leaves is one that the noise exceeds with probability SLIGHT."""
+        independent = self.likelihood.measurements / self.likelihood.correlation_time
+        return bool(self.chi_square * independent <= chdtri(independent, SLIGHT))
 
     @cached_property
     def response(self) -> Response:
@@ -179,12 +185,6 @@ class Hypothesis:
     def rho(self) -> float:
         """Posterior mean of the discrepancy's size, as a share of the laws' own."""
         return self._with_law[1] if self.laws else 0.0
-
-
-def at_noise(model: Hypothesis) -> bool:
-    """Whether the mean square of what a fit leaves is one that the noise itself exceeds with probability SLIGHT."""
-    independent = model.likelihood.measurements / model.likelihood.correlation_time
-    return bool(model.chi_square * independent <= chdtri(independent, SLIGHT))
 
 
 def played(likelihood: Likelihood, simulator: Simulator) -> Likelihood:

@@ -12,7 +12,7 @@ from compass_ros.discovery.candidates import Candidate
 from compass_ros.discovery.discrepancy import to_first_order
 from compass_ros.discovery.first_order import FirstOrder, Ranked
 from compass_ros.discovery.fits import Begun, from_parent, in_common, telling, whole
-from compass_ros.discovery.hypothesis import Hypothesis, at_noise, name_of
+from compass_ros.discovery.hypothesis import Hypothesis, name_of
 from compass_ros.discovery.odds import Known, Prior, Weighed
 from compass_ros.discovery.race import first_of_each, race
 from compass_ros.discovery.scatter import ranked_scatter, with_scatter
@@ -106,7 +106,7 @@ def shape_anew(known: Known) -> None:
     for best, odds in known.ordered[:1]:
         count = Counter(a.effect.name for a in best.laws)
         searched = [a for a in best.laws if count[a.effect.name] > 1 and any(q.grid for q in a.effect.quantities)]
-        for attached in [] if at_noise(best) else searched:
+        for attached in [] if best.at_noise else searched:
             rest = known.without(best, [attached])
             again = FirstOrder(rest[0].response).ranked(Candidate(attached))[:1] if rest else []
             if rest and again and rest[1] + again[0].gain > odds:

@@ -87,11 +87,9 @@ def stated_errors(cell: Cell, likelihood: Likelihood) -> Floats:
 
 def _stated(cell: Cell, stated: Floats) -> Iterator[Ints]:
     """Columns with a stated error that say one place together; of joints each alone."""
-    for signal in cell.signals:
-        columns = np.arange(signal.columns.start, signal.columns.stop)
-        columns = columns[stated[columns] > 0]
-        if len(columns):
-            yield from columns[:, None] if signal.jointed else [columns]
+    for one in (np.array(columns) for signal in cell.signals for columns in signal.together):
+        if np.any(stated[one] > 0):
+            yield one[stated[one] > 0]
 
 
 def _components(places: Floats) -> Floats:

@@ -163,7 +163,7 @@ class Judge:
         sentence = f"{place(where, self._flat)}, {lacks}; {sizes}; {gaps}."
         law = best.physics[0]
         sites = self.simulator.places.sites(law.objects, law.effect.on)
-        said = self._said(verdict, sentence, _on(where, sites, law.objects), findings, best)
+        said = self._said(verdict, sentence, _on(where, sites, law.distinct), findings, best)
         return replace(said, rivals=tuple(models)) if verdict == "ambiguous" else said
 
     def _said(
@@ -257,7 +257,7 @@ def _on(where: Where, sites: Sequence[Site], names: Sequence[str]) -> Where:
     kinds = {word_of(site.kind) for site in sites}
     kind = kinds.pop() if len(kinds) == 1 else None
     phase = GENERAL.get(where.phase, where.phase)
-    return replace(where, phase=phase, site_kind=kind, site="+".join(dict.fromkeys(names)) or "all")
+    return replace(where, phase=phase, site_kind=kind, site="+".join(names) or "all")
 
 
 def _explained(model: Hypothesis, laws: Sequence[Attached]) -> tuple[ExplainedLaw, ...]:
@@ -268,5 +268,5 @@ def _explained(model: Hypothesis, laws: Sequence[Attached]) -> tuple[ExplainedLa
             continue
         numbers = zip(attached.effect.quantities, values[own], model.std[own], strict=True)
         quantities = {q.name: EffectParameter(float(v), float(e), q.unit) for q, v, e in numbers}
-        out.append(ExplainedLaw(attached.effect.name, tuple(dict.fromkeys(attached.objects)), quantities))
+        out.append(ExplainedLaw(attached.effect.name, attached.distinct, quantities))
     return tuple(out)

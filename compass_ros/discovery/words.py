@@ -122,7 +122,7 @@ def value_of(finding: EffectFinding, attached: Attached, told: bool) -> str:
             (sure if told_from_zero else open_).append(said)
         elif told_from_zero and quantity.name not in _REGION:
             shapes.append(said)
-    on = f" of {', '.join(dict.fromkeys(attached.objects))}" if told else ""
+    on = f" of {', '.join(attached.distinct)}" if told else ""
     of_chance = " (standard deviations over episodes, each of which has its own)" * attached.effect.scattered
     if not sure:
         return f"{finding.name}{on}, {', '.join(open_)} (shows only together with other numbers)"

@@ -15,7 +15,8 @@ of the 2 s that shots take."""
 
 
 def touching(model: mujoco.MjModel, states: Floats) -> tuple[tuple[str, str], ...]:
-    """The pairs of geoms that touch in (E, T, s) full states, the longest first: what has names, on named bodies."""
+    """The pairs of geoms that touch in (E, T, s) full states, the longest first: named ones, on bodies with name and
+    mass."""
     data, count = mujoco.MjData(model), Counter[tuple[int, int]]()
     for state in states[:, :: max(states.shape[1] // MOMENTS, 1)].reshape(-1, states.shape[2]):
         mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)

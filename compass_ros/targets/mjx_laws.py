@@ -206,8 +206,8 @@ def _evaluate(term: Term, s: _State) -> tuple[Any, Any, Any]:  # noqa: PLR0911, 
             x, _, _ = _dry(s, p[0], 0.0)
             return jnp.where(s.vx > 0, x, 0.0), 0.0, 0.0
         case "load_friction":  # friction as a share of the load, what is more at rest, speed over which that fades
-            more = p[1] * jnp.exp(-s.vx * s.vx / (p[2] * p[2])) if p[1] > 0 else 0.0
-            return _dry(s, (p[0] + more) * jnp.abs(s.load), 0.0)
+            fades = jnp.where(p[2] == 0, 1.0, p[2])
+            return _dry(s, (p[0] + p[1] * jnp.exp(-((s.vx / fades) ** 2))) * jnp.abs(s.load), 0.0)
         case "pulsating":  # cosine and sine amplitude, creep speed, share of the weight, frequency
             turn = 2 * jnp.pi * p[4] * s.time
             return _along(s, (p[0] * jnp.cos(turn) + p[1] * jnp.sin(turn)) * s.weight * p[3], p[2])

@@ -38,6 +38,11 @@ class Attached:
         return tuple(self.objects[i : i + size] for i in range(0, len(self.objects), size)) or ((),)
 
     @property
+    def distinct(self) -> tuple[str, ...]:
+        """The objects, each once: a geom may stand in several pairs."""
+        return tuple(dict.fromkeys(self.objects))
+
+    @property
     def amplitudes(self) -> Bools:
         """(q,) which quantities are amplitudes."""
         return np.array([q.amplitude for q in self.effect.quantities])
