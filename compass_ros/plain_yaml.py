@@ -1,8 +1,9 @@
 """YAML as plain data: text, numbers, lists, mappings; nothing that runs, and nothing larger than its text.
 
 PyYAML's safe loader still takes more than files of this suite need: aliases (a few lines stand for more than any memory
-holds), dates, binary data, nesting without end, numbers of any length; and its constructors fail with whatever Python
-raises. Here all of that is a yaml.YAMLError.
+holds), dates, binary data, nesting without end, numbers of any length, a key that stands twice, of which the last one
+counts; and its constructors fail with whatever Python raises. Here all of that is a yaml.YAMLError, of one line that
+begins with the line of the text where the fault is.
 """
 
 from __future__ import annotations
@@ -24,7 +25,22 @@ def plain_yaml(text: str) -> Any:
     """The content of a YAML text. Raises yaml.YAMLError."""
     if len(text) > LARGEST:
         raise yaml.YAMLError(f"{len(text)} letters; at most {LARGEST} are read")
-    return yaml.load(text, Loader=_PlainLoader)  # noqa: S506  (a SafeLoader with less)
+    try:
+        return yaml.load(text, Loader=_PlainLoader)  # noqa: S506  (a SafeLoader with less)
+    except yaml.MarkedYAMLError as error:
+        raise yaml.YAMLError(_fault(error)) from error
+    except yaml.reader.ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        raise yaml.YAMLError(f"line {line}: a letter that YAML does not have, number {error.character}") from error
+
+
+def _fault(error: yaml.MarkedYAMLError) -> str:
+    """Where it is, what it is, and in what; the last with the line where that begins."""
+    mark, begin = error.problem_mark or error.context_mark, error.context_mark
+    where = f"line {mark.line + 1}: " if mark else ""
+    since = f" that begins in line {begin.line + 1}" if begin and mark and begin.line != mark.line else ""
+    said = [error.problem or "", f"{error.context}{since}" if error.context else ""]
+    return where + ", ".join(part for part in said if part)
 
 
 class _PlainLoader(yaml.SafeLoader):
@@ -50,6 +66,19 @@ class _PlainLoader(yaml.SafeLoader):
         node = super().compose_node(parent, index)
         self._depth -= 1
         return node
+
+    def construct_mapping(self, node: yaml.Node, deep: bool = False) -> dict[Any, Any]:
+        """No key twice. A node that only its tag calls a mapping is refused by the base class."""
+        first: dict[tuple[str, str], int] = {}
+        for key, _ in node.value if isinstance(node, yaml.MappingNode) else ():
+            if not isinstance(key, yaml.ScalarNode):
+                continue
+            line, same = key.start_mark.line + 1, (key.tag, key.value)
+            if same in first:
+                there = f"in line {first[same]} and in line {line}" if line != first[same] else f"both in line {line}"
+                raise yaml.YAMLError(f"the key '{key.value[:40]}' stands twice, {there}")
+            first[same] = line
+        return super().construct_mapping(node, deep)  # type: ignore[arg-type]
 
     def fetch_flow_collection_start(self, TokenClass: type[yaml.Token]) -> None:
         """The scanner looks far ahead, and takes seconds for a thousand brackets."""

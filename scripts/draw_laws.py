@@ -56,8 +56,8 @@ def gallery() -> str:
         lines += [
             f"## {channel}",
             "",
-            "| law | what the simulator lacks | in data | what one sees |",
-            "|---|---|---|---|",
+            "| law: what the simulator lacks | in data | what one sees |",
+            "|---|---|---|",
         ]
         for name, law in EFFECTS.items():
             if law.channel == channel:

@@ -102,3 +102,23 @@ def test_what_a_plain_yaml_may_say(tmp_path: Path) -> None:
     content = read_yaml(path)
     assert content["a"] == [1, -2500.0, float("inf"), True, None, None, 31, "text"]
     assert content["b"] == {"day": "2026-11-20", "quoted": "1"}
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("a: 1\nb: {c: 1, d: 2}\na: 3\n", "the key 'a' stands twice, in line 1 and in line 3"),
+        ("a: 1\nb: {c: 1, c: 2}\n", "the key 'c' stands twice, both in line 2"),
+        ("a: 1\nb: \x07\n", "line 2: a letter that YAML does not have, number 7"),
+        ("a: 'x\nb: 2\n", "line 3: found unexpected end of stream, while scanning a quoted scalar that"),
+        ("a: 1\n\tb: 2\n", "line 2: "),
+    ],
+)
+def test_a_broken_yaml_is_refused_with_the_line_of_its_fault(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "broken.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        read_yaml(path)
+    assert str(caught.value).startswith(f"{path}: not valid YAML: {says}")
+    assert "\n" not in str(caught.value)
+    assert "unicode string" not in str(caught.value)

@@ -11,6 +11,7 @@ while there is no air) is listed: which fields matter is for the calibration to 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -118,7 +119,7 @@ def _geom(m: mujoco.MjModel, geom: int) -> Iterator[Candidate]:
     for i, word in enumerate(("sliding", "torsional", "rolling")):
         friction = float(m.geom_friction[geom, i])
         unit = "1" if i == 0 else "m"
-        yield times(f"{name}@dyna@friction_{word}", f"geom_friction[{i}]", name, friction, 0.8, 0.2, unit)
+        yield _friction(f"{name}@dyna@friction_{word}", f"geom_friction[{i}]", name, friction, unit)
     yield from _contact(name, "geom", name, m.geom_solref[geom], m.geom_solimp[geom])
     yield from _distances(m, "geom", geom, name)
     weight = float(m.geom_solmix[geom])
@@ -128,12 +129,18 @@ def _geom(m: mujoco.MjModel, geom: int) -> Iterator[Candidate]:
             yield times(f"{name}@dyna@{word}", f"geom_fluid[{i}]", name, float(m.geom_fluid[geom, i]), 0.5, 0.05, "1")
 
 
+def _friction(name: str, field: str, of: str, value: float, unit: str) -> Candidate:
+    """Nowhere below zero, also where the scene has none."""
+    found = times(name, field, of, value, 0.8, 0.2, unit)
+    return replace(found, low=max(found.low, 0.0))
+
+
 def _pair(m: mujoco.MjModel, pair: int) -> Iterator[Candidate]:
     first, second = (m.geom(int(g[pair])).name for g in (m.pair_geom1, m.pair_geom2))
     of = m.pair(pair).name or f"{first}+{second}"
     for i, word in enumerate(("sliding_1", "sliding_2", "torsional", "rolling_1", "rolling_2")):
         value = float(m.pair_friction[pair, i])
-        yield times(f"{of}@dyna@friction_{word}", f"pair_friction[{i}]", of, value, 0.8, 0.2, "1" if i < 2 else "m")
+        yield _friction(f"{of}@dyna@friction_{word}", f"pair_friction[{i}]", of, value, "1" if i < 2 else "m")
     yield from _contact(of, "pair", of, m.pair_solref[pair], m.pair_solimp[pair])
     yield from _distances(m, "pair", pair, of)
 

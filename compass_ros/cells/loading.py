@@ -9,6 +9,7 @@ from pathlib import Path
 from compass_ros.cells.auto import with_auto
 from compass_ros.cells.cell import Cell
 from compass_ros.cells.drives import Drives
+from compass_ros.cells.physical import check_physical
 from compass_ros.cells.registry import dynamics_of
 from compass_ros.cells.scene_files import scene_files
 from compass_ros.cells.spec import validated_spec
@@ -36,6 +37,7 @@ def load(name_or_path: str | Path, parameters: Parameters = "cell") -> Cell:
         path = cells_folder() / f"{name_or_path}.yaml"
     content, bases = _whole(path)
     spec = validated_spec(content, str(path))
+    check_physical(spec.parameters, str(path))
     model = path.parent / spec.model
     if not model.is_file():
         raise ConfigError(f"{path}: model: no file {model}")

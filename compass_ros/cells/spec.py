@@ -9,13 +9,13 @@ from dataclasses import fields
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as validated
 
+from compass_ros.cells.refusal import refusal
 from compass_ros.cells.series import InputSpec, Name, SignalSpec, WindowSpec, check_series
 from compass_ros.cells.start import ReleaseSpec, StartSpec
-from compass_ros.errors import ConfigError, nearest, shown
+from compass_ros.errors import ConfigError, nearest
 from compass_ros.types import Quantity
 
 _strict = ConfigDict(extra="forbid", allow_inf_nan=False)
-_UNKNOWN = "unexpected_keyword_argument"
 
 
 @validated(frozen=True, config=_strict, kw_only=True)
@@ -125,13 +125,9 @@ def validated_spec(content: Mapping[str, object], where: str) -> CellSpec:
     try:
         spec = TypeAdapter(CellSpec).validate_python(dict(content))
     except ValidationError as error:
-        found = error.errors()
-        first = next((e for e in found if e["type"] == _UNKNOWN), found[0])  # a misspelt name also lacks the right one
-        name = ".".join(str(part) for part in first["loc"])
         specs = (CellSpec, ParameterSpec, ActionSpec, ObjectSpec, FactorSpec, StartSpec, ReleaseSpec)
         known = [f.name for spec in (*specs, InputSpec, SignalSpec, WindowSpec) for f in fields(spec)]
-        hint = nearest(name.rsplit(".", 1)[-1], known) if first["type"] == _UNKNOWN else ""
-        raise ConfigError(f"{where}: {name}: {first['msg']}, found {shown(first['input'])}{hint}") from error
+        raise ConfigError(f"{where}: {refusal(error, content, known)}") from error
     _check_values(spec, where)
     _check_names(spec, where)
     _check_measured(spec, where)
@@ -156,6 +152,9 @@ def _check_measured(spec: CellSpec, where: str) -> None:
 def _check_values(spec: CellSpec, where: str) -> None:
     """Defaults and targets inside bounds, intervals the right way round."""
     for p in spec.parameters:
+        if p.bounds[0] > p.bounds[1]:
+            low, high = p.bounds
+            raise ConfigError(f"{where}: {p.name}: bounds: the lower bound {low:g} is above the upper one {high:g}")
         for what, value in (("default", p.default), ("target", p.target)):
             if value is not None and not p.bounds[0] <= value <= p.bounds[1]:
                 raise ConfigError(f"{where}: {p.name}: {what} {value:g} is outside its bounds {list(p.bounds)}")

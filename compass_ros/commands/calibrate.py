@@ -150,7 +150,13 @@ def run(
     try:
         with _shown(style) as report, _live(out, serve) as live:
             steady = Steady(live.beside(report) if live else report)
-            result = write(*pipeline(reading.episodes, cell, validated, steady, write))
+
+            def keep(result: Result, found: Discovery) -> Result:
+                kept = write(result, found)
+                report.say(f"parameters are in {out}; the search for missing physics can take longer than they did")
+                return kept
+
+            result = write(*pipeline(reading.episodes, cell, validated, steady, keep))
             steady.end("written")
             if live:
                 live.end()
@@ -187,12 +193,18 @@ def _live(out: Path, port: int | None) -> Iterator[LiveReport | None]:
 class _Quiet:
     """Nothing, for a test or a script."""
 
+    def say(self, line: str) -> None:
+        pass
+
     def __call__(self, progress: Progress) -> bool:
         return True
 
 
 class _JsonLines:
     """One JSON object a line on standard output, for programs that watch."""
+
+    def say(self, line: str) -> None:
+        pass
 
     def __call__(self, progress: Progress) -> bool:
         def number(value: float) -> float | None:

@@ -25,7 +25,10 @@ def evaluate(
     as_json: Annotated[bool, typer.Option("--json", help="print JSON instead of a table")] = False,
     threads: Annotated[int, typer.Option(min=0, help="threads for rollouts; 0: all cores")] = 0,
 ) -> None:
-    """Say how well a result predicts recordings that it has not seen: rms, floor and share removed, by signal."""
+    """Say how well a result predicts recordings that it has not seen, by signal.
+
+    rms, noise floor, and the share of the mean square above the floor that is removed.
+    """
     from compass_ros.cells import load
     from compass_ros.evaluation import evaluate as judge
     from compass_ros.operation.current import read_usable
@@ -90,7 +93,8 @@ def show(said: Evaluation) -> None:
     from compass_ros.reporting.table import NARROW
 
     compared = f"recordings: {len(said.recordings)}, in {said.windows} parts"
-    table = Table(caption=Text(compared, "dim"), caption_justify="left", **NARROW)
+    caption = f"{compared}; removed: share of the mean square above the floor"
+    table = Table(caption=Text(caption, "dim"), caption_justify="left", **NARROW)
     table.add_column("signal")
     table.add_column("unit")
     table.add_column("floor", justify="right")

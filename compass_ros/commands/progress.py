@@ -42,6 +42,10 @@ class Bar:
     ) -> None:
         self._bar.stop()
 
+    def say(self, line: str) -> None:
+        """A line that stays, above the bar."""
+        self._console.print(line, markup=False, highlight=False, soft_wrap=True)
+
     def __call__(self, progress: Progress) -> bool:
         gap = f"gap {progress.gap:.3f}" if math.isfinite(progress.gap) else ""
         if self._log and not self._console.is_terminal and progress.stage != self._stage:

@@ -253,18 +253,28 @@ def _bounds(candidate: Candidate) -> tuple[Floats, Floats, Floats]:
 
 def _evidence(matrix: Floats, pull: Floats, at: Ints) -> float:
     """Log evidence of some amplitudes of unit prior over their absence."""
-    inner = matrix[np.ix_(at, at)] + np.eye(len(at))
-    return 0.5 * float(pull[at] @ np.linalg.solve(inner, pull[at]) - np.linalg.slogdet(inner)[1])
+    size, axes = _precision(matrix[np.ix_(at, at)], np.ones(len(at)))
+    return 0.5 * float(np.sum((axes.T @ pull[at]) ** 2 / size - np.log(size)))
 
 
 def best_sizes(matrix: Floats, pull: Floats, low: Floats, high: Floats, prior: Floats) -> tuple[Floats, float]:
     """(n,) amplitudes within bounds that lower the cost most, and by how much, with a Gaussian prior."""
-    full = matrix + np.diag(1 / prior**2)
-    sizes = -np.linalg.solve(full, pull)
+    size, axes = _precision(matrix, prior)
+    white = (axes.T @ (prior * pull)) / np.sqrt(size)
+    root = np.sqrt(size)[:, None] * axes.T / prior  # its square is the precision
+    sizes = -prior * (axes @ (white / np.sqrt(size)))
     if np.any((sizes < low) | (sizes > high)):
         if len(pull) == 1:
             sizes = np.clip(sizes, low, high)
         else:
-            root = np.linalg.cholesky(full)
-            sizes = lsq_linear(root.T, -np.linalg.solve(root, pull), (low, high), method="bvls").x
-    return sizes, -float(pull @ sizes + 0.5 * sizes @ full @ sizes)
+            sizes = lsq_linear(root, -white, (low, high), method="bvls").x
+    return sizes, -float(pull @ sizes + 0.5 * np.sum((root @ sizes) ** 2))
+
+
+def _precision(matrix: Floats, prior: Floats) -> tuple[Floats, Floats]:
+    """(n,) eigenvalues, 1 at least, and (n, n) axes of the posterior's precision in the prior's standard deviations.
+
+    Recordings that tell of two amplitudes by 10^16 the same leave a matrix that is singular in double precision.
+    """
+    told, axes = np.linalg.eigh(prior[:, None] * matrix * prior)
+    return np.asarray(1 + np.maximum(told, 0.0)), np.asarray(axes)

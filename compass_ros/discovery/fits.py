@@ -9,10 +9,10 @@ import numpy as np
 
 from compass_ros.calibration.cost import Point, cost, robust_loss
 from compass_ros.calibration.differences import Linear, difference_steps, extended
-from compass_ros.calibration.least_squares import minimise
+from compass_ros.calibration.least_squares import Fit, minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import Strongest, growing
-from compass_ros.calibration.residuals import typical_residual
+from compass_ros.calibration.residuals import covariance, typical_residual
 from compass_ros.calibration.settle import settled
 from compass_ros.discovery.evidence import solve
 from compass_ros.discovery.first_order import WIDTH, Ranked
@@ -46,6 +46,8 @@ class Begun:
     """Differences near it, where these are all episodes."""
     bent: bool = True
     """Whether it began at its parent's fit, near which its parent's differences hold."""
+    occam: float = 0.0
+    """Log of the share of its prior that these episodes leave: Laplace's factor, by its last differences."""
 
 
 def telling(parent: Hypothesis) -> Ints:
@@ -85,7 +87,14 @@ def from_parent(parent: Hypothesis, ranked: Ranked, rows: Ints, iterations: int)
     linear = extended(parent.fit.linear.of(rows), likelihood, starts[best], residuals[best], everything)
     fit = minimise(likelihood, starts[best], everything, iterations, parent.fit.robust, 1.0, linear, fresh=False)
     everywhere = len(rows) == len(parent.likelihood.inputs)
-    return Begun(laws, fit.point, fit.linear if everywhere else None)
+    return Begun(laws, fit.point, fit.linear if everywhere else None, occam=occam(likelihood, fit))
+
+
+def occam(likelihood: Likelihood, fit: Fit) -> float:
+    """Log of the share of the prior's volume that the recordings leave of what is free (MacKay 1992, Occam's factor):
+    what a model pays for each number that they tell. Rough, by the last differences of a fit; what is left above the
+    noise tells as little as in `covariance`."""
+    return 0.5 * float(np.linalg.slogdet(covariance(likelihood, fit))[1])
 
 
 def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:

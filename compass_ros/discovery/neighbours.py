@@ -155,12 +155,12 @@ def probable(begun: Sequence[Begun], prior: Prior) -> list[Begun]:
     """Those that could be probable, and in any case the best two and the best of the best two laws; one of each set of
     laws on the same sites.
 
-    By the likelihood and the prior odds: what shapes cost is of the size of the margin. Where more than one law is
-    missing none of them comes near, and these differences say little about which is one of them.
+    By likelihood, prior odds and what their numbers cost: a law on six joints may have forty. Where more than one law
+    is missing none of them comes near, and these differences say little about which is one of them.
     """
     best: dict[frozenset[tuple[str, tuple[str, ...]]], tuple[float, Begun]] = {}
     for one in begun:
-        odds = prior.of_laws(a.effect.name for a in one.laws) - one.point.cost
+        odds = prior.of_laws(a.effect.name for a in one.laws) - one.point.cost + one.occam
         sites = frozenset((a.effect.name, a.objects) for a in one.laws)
         if sites not in best or odds > best[sites][0]:
             best[sites] = odds, one

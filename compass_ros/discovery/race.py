@@ -17,7 +17,7 @@ from compass_ros.calibration.refine import Strongest, growing, strongest
 from compass_ros.calibration.residuals import typical_residual
 from compass_ros.discovery.discrepancy import free
 from compass_ros.discovery.first_order import WIDTH
-from compass_ros.discovery.fits import FEW, Begun, lacking, shapes, with_law
+from compass_ros.discovery.fits import FEW, Begun, lacking, occam, shapes, with_law
 from compass_ros.discovery.hypothesis import Hypothesis, widened
 from compass_ros.discovery.response import respond
 from compass_ros.discovery.settings import PRIOR_UNKNOWN, SLIGHT
@@ -83,8 +83,9 @@ def _at_the_end(parent: Hypothesis, laws: tuple[Attached, ...], likelihood: Like
     """Some steps more with all parameters of the parent free, and its loss."""
     free, steps = with_law(parent, point.values)
     robust = max(parent.fit.robust, 3.0 * typical_residual(likelihood, point))
-    point = minimise(likelihood, point, free, FEW, robust, 3.0, steps=steps, fresh=False).point
-    return Begun(laws, replace(point, cost=float(cost(likelihood, [point], parent.fit.robust)[0][0])), bent=False)
+    fit = minimise(likelihood, point, free, FEW, robust, 3.0, steps=steps, fresh=False)
+    loss = float(cost(likelihood, [fit.point], parent.fit.robust)[0][0])
+    return Begun(laws, replace(fit.point, cost=loss), bent=False, occam=occam(likelihood, fit))
 
 
 @dataclass(frozen=True, eq=False)

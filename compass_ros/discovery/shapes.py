@@ -41,7 +41,7 @@ def best_shapes(
     def fall(point: Floats) -> float:
         return -gain(at(point))
 
-    grids = [shape_grid(quantities[i]) for i in shape_of]
+    grids = [np.clip(shape_grid(quantities[i]), quantities[i].low, quantities[i].high) for i in shape_of]
     nodes = np.array(list(product(*(range(len(grid)) for grid in grids))))
     points = np.array(list(product(*grids)))
     falls = np.array([fall(point) for point in points])

@@ -11,13 +11,13 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import Noise
 from compass_ros.discovery.finding import Discovery, Tried, Weighed, held_out_error
 from compass_ros.discovery.floor import TWICE, shown_noise
-from compass_ros.discovery.hypothesis import Hypothesis, name_of
+from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.discovery.maps import table_map
 from compass_ros.discovery.numerics import with_numerics
 from compass_ros.discovery.search import Found
 from compass_ros.discovery.settings import SLIGHT
 from compass_ros.discovery.where import whereabouts
-from compass_ros.discovery.words import DEPENDS, corrected, errors, missing, place, values_of, where_of
+from compass_ros.discovery.words import DEPENDS, corrected, errors, missing, place, short_name, values_of, where_of
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.simulation.replay import rms_distance
@@ -111,7 +111,7 @@ class Judge:
     def none(self) -> Discovery:
         """That nothing is missing."""
         unit = f"m{self.simulator.unit}"
-        numbers = f"held-out error {1e3 * self._before:.2f} {unit}, noise {1e3 * self._floor:.2f} {unit}"
+        numbers = f"{self._error} {1e3 * self._before:.2f} {unit}, noise {1e3 * self._floor:.2f} {unit}"
         sentence = f"Nothing is missing that these recordings could show: {numbers}."
         return replace(self._said("none", sentence), noise=self.noise)
 
@@ -122,18 +122,17 @@ class Judge:
         sentence += DEPENDS[where.depends_on]
         _, unknown, of_models = self.found.probabilities
         sentence += f" (probability {unknown:.2f}{self._best_law(of_models)})"
-        before = f"held-out error {1e3 * self._before:.2f} {unit}, floor {1e3 * self._floor:.2f} {unit}"
+        before = f"{self._error} {1e3 * self._before:.2f} {unit}, floor {1e3 * self._floor:.2f} {unit}"
         return self._said("unknown", f"{sentence}; {before}.", self._of_discrepancy(where))
 
     def _best_law(self, of_models: Floats) -> str:
-        """What the most probable model leaves, where it is less than what is left without."""
-        best = self.found.models[0] if self.found.models else self.found.plain
-        was, now = (f"{model.chi_square**0.5:.1f}" for model in (self.found.plain, best))
-        if float(now) >= float(was):
+        """The most probable model that comes nearer than none, and what it leaves of the episodes that judge."""
+        if not self.found.models or self.found.models[0].chi_square >= self.found.plain.chi_square:
             return ""
+        best = self.found.models[0]
         has = f"{of_models[0]:.2g}" if of_models[0] >= 0.001 else "less than 0.001"
-        left = f"leaves {now} of {was} times the noise in fitted episodes"
-        return f"; the best law, {name_of(best.physics)}, has {has} and {left}"
+        left = f"{1e3 * self._after(best):.2f} m{self.simulator.unit}"
+        return f"; the best law, {short_name(best.physics)}, has {has}, {self._error} with it {left}"
 
     def _of_discrepancy(self, where: Where) -> Where:
         """With the site of a discrepancy that no law explains."""
@@ -155,11 +154,13 @@ class Judge:
         where = where_of(best.physics, numbers[0], self.simulator.movers())
         lacks = missing(best.physics, numbers, self.simulator.places)
         if verdict == "ambiguous":
-            lacks = "the simulator lacks one of these: " + "; ".join(dict.fromkeys(name_of(m.physics) for m in models))
+            lacks = (
+                f"the simulator lacks one of these: {'; '.join(dict.fromkeys(short_name(m.physics) for m in models))}"
+            )
         sizes = values_of(findings, best.physics)
         sizes = f"the most probable is {sizes}" if verdict == "ambiguous" else sizes
         sizes += corrected(best.corrections)
-        gaps = errors(self._before, after, self._floor, self.simulator.unit)
+        gaps = errors(self._error, self._before, after, self._floor, self.simulator.unit)
         sentence = f"{place(where, self._flat)}, {lacks}; {sizes}; {gaps}."
         law = best.physics[0]
         sites = self.simulator.places.sites(law.objects, law.effect.on)
@@ -236,6 +237,13 @@ class Judge:
             judged, values = model.likelihood.on(self.held_out), model.fit.point.values
             self.opened[model.name] = held_out_error(self.simulator.cell, judged, values)
         return self.opened[model.name]
+
+    @property
+    def _error(self) -> str:
+        """What the error of the episodes that judge is called: where all were fitted, they judge themselves."""
+        fitted, judging = self.found.plain.likelihood.measured, self.held_out.measured
+        alike = fitted.shape == judging.shape and np.array_equal(fitted, judging, equal_nan=True)
+        return "error on the fitted episodes" if alike else "held-out error"
 
     @property
     def _before(self) -> float:

@@ -154,6 +154,17 @@ def corrected(laws: Sequence[Attached]) -> str:
     return f"; its form is corrected by {listed(tuple(said))}" if said else ""
 
 
-def errors(before: float, after: float, floor: float, unit: Unit) -> str:
-    """Held-out errors in thousandths of the unit."""
-    return f"held-out error {1e3 * before:.2f} -> {1e3 * after:.2f} m{unit}, floor {1e3 * floor:.2f} m{unit}"
+def short_name(laws: Sequence[Attached]) -> str:
+    """Laws with their sites; of one on more than two how many: 'spring(elbow) + eccentricity on 6 sites'."""
+    sites: dict[str, list[str]] = {}
+    for a in laws:
+        sites.setdefault(a.effect.name, []).extend(a.distinct)
+    return " + ".join(
+        f"{name} on {len(own)} sites" if len(own) > SEVERAL else f"{name}({', '.join(own)})" if own else name
+        for name, own in sites.items()
+    )
+
+
+def errors(what: str, before: float, after: float, floor: float, unit: Unit) -> str:
+    """Errors of the episodes that judge, in thousandths of the unit."""
+    return f"{what} {1e3 * before:.2f} -> {1e3 * after:.2f} m{unit}, floor {1e3 * floor:.2f} m{unit}"

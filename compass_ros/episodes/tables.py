@@ -66,7 +66,8 @@ def import_tables(yaml_path: str | Path, out: str | Path, data: str | Path | Non
 
 def _roots(path: Path) -> list[Path]:
     named = os.environ.get(DATA_VARIABLE)
-    return [*([Path(named)] if named else []), path.parent, _PROJECT.parent / "shared" / "data"]
+    beside = _PROJECT.parent / "shared" / "data"  # of a clone; an installed package has none
+    return [*([Path(named)] if named else []), path.parent, *([beside] if beside.is_dir() else [])]
 
 
 def _find(name: str, roots: Sequence[Path], path: Path) -> list[Path]:

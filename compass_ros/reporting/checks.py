@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from compass_ros.reporting.numbers import probability, with_unit
+from compass_ros.reporting.verdicts import meaning, title
+from compass_ros.reporting.windows import word
 from compass_ros.reporting.words import (
     VERDICT_LEVEL,
-    VERDICT_MEANING,
-    VERDICT_TITLE,
     Level,
     best_model,
     by_kind,
@@ -81,7 +81,9 @@ def _stopped(result: Result) -> Iterator[Check]:
     if result.cancelled:
         yield Check("bad", "Stopped early", "The calibration was cancelled; these are the values it had by then.")
     if not result.held_out:
-        yield Check("bad", "Nothing held out", "Every episode was fitted; nothing shows how well others are predicted.")
+        yield Check(
+            "bad", "Nothing held out", f"Every {word(result)} was fitted; nothing shows how well others are predicted."
+        )
 
 
 def _left_out(result: Result) -> Iterator[Check]:
@@ -113,7 +115,7 @@ def _improvement(result: Result) -> Iterator[Check]:
         return
     ratio = after / before
     errors = [with_unit(error, result.unit) for error in (before, after)]
-    numbers = f"{errors[0]} with the default parameters, {errors[1]} now; held-out episodes."
+    numbers = f"{errors[0]} with the default parameters, {errors[1]} now; held-out {word(result)}s."
     if ratio <= SMALLER:
         yield Check("good", f"{1 / max(ratio, 1e-9):.0f} times closer than before", numbers)
     elif before <= AT_FLOOR * result.noise_floor_m:
@@ -128,9 +130,9 @@ def _carries_over(result: Result) -> Iterator[Check]:
     if not (math.isfinite(fitted) and math.isfinite(held_out) and fitted > 0):
         return
     errors = [with_unit(error, result.unit) for error in (fitted, held_out)]
-    numbers = f"{errors[0]} on fitted episodes, {errors[1]} on held-out ones."
+    numbers = f"{errors[0]} on fitted {word(result)}s, {errors[1]} on held-out ones."
     if held_out <= OVERFIT * fitted:
-        yield Check("good", "Carries over to new episodes", numbers)
+        yield Check("good", f"Carries over to new {word(result)}s", numbers)
     else:
         yield Check("care", "Does not carry over fully", f"{numbers} Record more, or more varied, episodes.")
 
@@ -183,12 +185,12 @@ def _at_bounds(result: Result) -> Iterator[Check]:
 
 def _verdict(result: Result) -> Iterator[Check]:
     verdict = result.mismatch.verdict
-    level, detail = VERDICT_LEVEL[verdict], VERDICT_MEANING[verdict]
+    level, detail = VERDICT_LEVEL[verdict], meaning(result.mismatch)
     if result.mismatch.effects:
         p = max(effect.evidence.false_alarm_p for effect in result.mismatch.effects)
         detail += f" Probability of a false alarm: {probability(p)}."
         level = "care" if level == "good" and p > 0.05 else level
-    yield Check(level, VERDICT_TITLE[verdict], detail)
+    yield Check(level, title(result.mismatch), detail)
 
 
 def _effects_predict(result: Result) -> Iterator[Check]:
@@ -203,6 +205,6 @@ def _effects_predict(result: Result) -> Iterator[Check]:
 def _blind_spots(result: Result) -> Iterator[Check]:
     names = result.mismatch.undetectable
     if names:
-        text = "These episodes could not have shown " + ", ".join(names[:NAMES_SHOWN])
+        text = f"These {word(result)}s could not have shown " + ", ".join(names[:NAMES_SHOWN])
         text += f" and {len(names) - NAMES_SHOWN} more." if len(names) > NAMES_SHOWN else "."
         yield Check("note", f"Blind to {len(names)} effect{'s' if len(names) > 1 else ''}", text)

@@ -16,14 +16,14 @@ from compass_ros.reporting.extras import ReportExtras, ResidualMap
 from compass_ros.reporting.numbers import MINUS, percent, plain, probability, unit_text, value_pm, with_unit
 from compass_ros.reporting.residuals import error_curves, left_over
 from compass_ros.reporting.table import STYLE, gap_table, parameter_table
+from compass_ros.reporting.verdicts import meaning, title
 from compass_ros.reporting.view.explanations import ranked, sites_named
 from compass_ros.reporting.view.gap import signals
 from compass_ros.reporting.view.missing import ranking
+from compass_ros.reporting.windows import word
 from compass_ros.reporting.words import (
     MODEL_LABEL,
     VERDICT_LEVEL,
-    VERDICT_MEANING,
-    VERDICT_TITLE,
     Level,
     where_rows,
 )
@@ -40,8 +40,8 @@ def print_diagnosis(result: Result, extras: ReportExtras, console: Console | Non
     """Print everything that a result says about its question 3, and whether to believe it."""
     out = console or Console()
     verdict = result.mismatch.verdict
-    out.print(Text.assemble((f"{VERDICT_TITLE[verdict]}. ", STYLE[VERDICT_LEVEL[verdict]]), result.mismatch.sentence))
-    out.print(Text(VERDICT_MEANING[verdict], "dim"))
+    out.print(Text.assemble((f"{title(result.mismatch)}. ", STYLE[VERDICT_LEVEL[verdict]]), result.mismatch.sentence))
+    out.print(Text(meaning(result.mismatch), "dim"))
     for heading, text in where_rows(result.mismatch.where, result.unit) if result.mismatch.where else ():
         out.print(Text(f"  {heading:8} {text}"))
     out.print(gap_table(result))
@@ -67,7 +67,9 @@ def print_diagnosis(result: Result, extras: ReportExtras, console: Console | Non
         out.print(Text.assemble((f"{MARK[check.level]} {check.title}. ", STYLE[check.level]), check.detail))
     out.print(Text(f"Is the result good? {SUMMARY[overall(checks)]}", STYLE[overall(checks)]))
     if result.mismatch.undetectable:
-        out.print(Text("These episodes could not have shown: " + ", ".join(result.mismatch.undetectable), "dim"))
+        out.print(
+            Text(f"These {word(result)}s could not have shown: " + ", ".join(result.mismatch.undetectable), "dim")
+        )
     if result.mismatch.next_experiment:
         out.print(Text.assemble(("Next experiment: ", "bold"), result.mismatch.next_experiment))
 
@@ -135,7 +137,7 @@ def _curves(result: Result) -> Iterator[Text]:
     low = min(max(floor, largest * 1e-3), largest * 0.5)
     end = max(float(c.time_s[-1]) for c in curves)
     yield Text(
-        f"Error over the {end:.1f} s of an episode, {BARS[0]} {with_unit(low, result.unit)} and less, "
+        f"Error over the {end:.1f} s of each {word(result)}, {BARS[0]} {with_unit(low, result.unit)} and less, "
         f"{BARS[-1]} {with_unit(largest, result.unit)}, logarithmic:"
     )
     width = max(len(c.object) for c in curves)

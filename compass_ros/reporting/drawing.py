@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from compass_ros.reporting.extras import ReportExtras, ResidualMap, Scene
-from compass_ros.reporting.words import MODEL_LABEL, MODELS, told
+from compass_ros.reporting.tracks import drawn
+from compass_ros.reporting.windows import began, word
+from compass_ros.reporting.words import MODEL_LABEL, MODELS, Model, best_model, told
 from compass_ros.types import Floats, Replay, ReplayedTrack, Result
 
 MAX_REPLAYS = 48
@@ -58,35 +61,53 @@ def plane(replays: Sequence[Replay]) -> tuple[int, int]:
     return first, second
 
 
-def chosen(replays: Sequence[Replay]) -> tuple[Replay, ...]:
-    """At most MAX_REPLAYS: held-out episodes first, then fitted ones, both in the order given."""
-    ordered = [r for r in replays if r.held_out] + [r for r in replays if not r.held_out]
-    return tuple(ordered[:MAX_REPLAYS])
+def worst_first(replays: Sequence[Replay], model: Model) -> tuple[Replay, ...]:
+    """Held-out episodes before fitted ones, of each the one that `model` predicts worst first."""
+    return tuple(sorted(replays, key=lambda r: (not r.held_out, -_badness(r, model))))
 
 
-def _path(values: Floats | None, axes: tuple[int, int]) -> list[list[float | None]] | None:
-    if values is None:
-        return None
-    if values.shape[1] == 1:
-        return [numbers(values[:, 0])]
-    return [numbers(values[:, axis]) for axis in axes]
+def _badness(replay: Replay, model: Model) -> float:
+    """Error of an episode; a simulator that lost all that it should follow has none and is the worst."""
+    error = episode_rmse(replay, model)
+    return error if math.isfinite(error) else math.inf
 
 
-def _replay(replay: Replay, axes: tuple[int, int]) -> dict[str, Any]:
-    tracks = []
-    for track in replay.tracks:
-        errors = {model: error_m(track, model) for model in MODELS}
-        tracks.append(
-            {
-                "object": track.object,
-                "time": numbers(track.time_s, 4),
-                "real": _path(track.real, axes),
-                "nominal": _path(track.nominal, axes),
-                "calibrated": _path(track.calibrated, axes),
-                "with_effects": _path(track.with_effects, axes),
-                "error_mm": {m: None if e is None else numbers(e * 1e3, 3) for m, e in errors.items()},
-            }
-        )
+def in_place(result: Result) -> tuple[Replay, ...]:
+    """Replays with those tracks alone that say where something is."""
+    return tuple(replace(r, tracks=tuple(t for t in r.tracks if not drawn(t, result).columns)) for r in result.replays)
+
+
+def chosen(result: Result) -> tuple[tuple[Replay, ...], tuple[Replay, ...]]:
+    """Episodes that are drawn, MAX_REPLAYS at most, and those that are not: with the smallest errors."""
+    ordered = worst_first(result.replays, best_model(result))
+    return ordered[:MAX_REPLAYS], ordered[MAX_REPLAYS:]
+
+
+def _path(values: Floats | None, axes: Sequence[int]) -> list[list[float | None]] | None:
+    return None if values is None else [numbers(values[:, axis]) for axis in axes]
+
+
+def _track(track: ReplayedTrack, result: Result, plane_axes: tuple[int, int]) -> dict[str, Any]:
+    """One object in the plane, or all numbers of one signal."""
+    shown = drawn(track, result)
+    axes = range(len(shown.columns)) if shown.columns else plane_axes
+    errors = {model: error_m(track, model) for model in MODELS}
+    return {
+        "object": track.object,
+        "columns": [{"name": column.name, "unit": column.unit} for column in shown.columns],
+        "error_unit": shown.thousandth,
+        "floor_mm": shown.floor * 1e3 if math.isfinite(shown.floor) else None,
+        "time": numbers(track.time_s, 4),
+        "real": _path(track.real, axes),
+        "nominal": _path(track.nominal, axes),
+        "calibrated": _path(track.calibrated, axes),
+        "with_effects": _path(track.with_effects, axes),
+        "error_mm": {m: None if e is None else numbers(e * 1e3, 3) for m, e in errors.items()},
+    }
+
+
+def _replay(replay: Replay, result: Result, axes: tuple[int, int]) -> dict[str, Any]:
+    tracks = [_track(track, result, axes) for track in replay.tracks]
     return {"name": replay.episode, "held_out": replay.held_out, "tracks": tracks}
 
 
@@ -148,6 +169,7 @@ def _iterations(result: Result, extras: ReportExtras) -> dict[str, Any]:
             "value": row.value if math.isfinite(row.value) else None,
             "std": row.std if math.isfinite(row.std) else None,
             "truth": extras.truth.get(row.name),
+            "identifiable": row.identifiable,
             "path": numbers(np.array([it.values[i] for it in traced]), 9),
         }
         for i, row in rows
@@ -167,18 +189,19 @@ def _iterations(result: Result, extras: ReportExtras) -> dict[str, Any]:
 
 def figure_data(result: Result, extras: ReportExtras) -> dict[str, Any]:
     """Everything that the report's scripts draw."""
-    axes = plane(result.replays)
-    before = extras.residual_before or distance_map(result.replays, "calibrated", axes)
-    after = extras.residual_after if extras.residual_before else distance_map(result.replays, "with_effects", axes)
+    placed = in_place(result)
+    axes = plane(placed)
+    before = extras.residual_before or distance_map(placed, "calibrated", axes)
+    after = extras.residual_after if extras.residual_before else distance_map(placed, "with_effects", axes)
     where = result.mismatch.where
     region = where.region if where is not None else None
     return {
         "models": [{"key": m, "label": MODEL_LABEL[m]} for m in MODELS if m in result.gap],
-        "unit": f"m{result.unit}",
-        "floor_mm": result.noise_floor_m * 1e3 if math.isfinite(result.noise_floor_m) else None,
+        "word": word(result),
+        "began": began(result, extras.scene),
         "axes": ["xyz"[axis] for axis in axes],
         "scene": _scene(extras.scene),
-        "episodes": [_replay(replay, axes) for replay in chosen(result.replays)],
+        "episodes": [_replay(replay, result, axes) for replay in chosen(result)[0]],
         "calibration": _iterations(result, extras),
         "maps": {"before": _map(before), "after": _map(after)},
         "region": None if region is None else {"centre": region.centre_m, "radius": region.radius_m},

@@ -11,11 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from compass_ros.reporting.drawing import episode_rmse, plane
-from compass_ros.reporting.extras import ReportExtras, ResidualMap
+from compass_ros.reporting.extras import ReportExtras, ResidualMap, Scene
 from compass_ros.reporting.figures import LINE, causal_graph, gap_bars, parameter_curves, save, styled, trajectories
 from compass_ros.reporting.numbers import unit_text
 from compass_ros.reporting.palette import LIGHT
 from compass_ros.reporting.residuals import error_curves, judged, left_over
+from compass_ros.reporting.windows import began
 from compass_ros.reporting.words import MODEL_LABEL, best_model, told
 from compass_ros.types import Region, Replay, Result
 
@@ -28,7 +29,7 @@ def write_figures(result: Result, extras: ReportExtras, folder: Path) -> tuple[P
     if any(told(row) for row in result.parameters) and result.trace:
         figures["parameters"] = parameter_curves(result, truth=extras.truth)
     if result.replays:
-        figures["error_over_time"] = error_over_time(result)
+        figures["error_over_time"] = error_over_time(result, extras.scene)
     residual = left_over(result, extras)
     if residual is not None:
         where = result.mismatch.where
@@ -49,8 +50,8 @@ def worst_replay(result: Result) -> Replay | None:
     return max((pair for pair in errors if math.isfinite(pair[0])), key=lambda pair: pair[0], default=(0.0, None))[1]
 
 
-def error_over_time(result: Result) -> Figure:
-    """Root mean square distance on held-out episodes over the shot, one panel an object; dotted: the noise floor."""
+def error_over_time(result: Result, scene: Scene | None = None) -> Figure:
+    """Root mean square distance on held-out episodes over their time, one panel an object; dotted: the noise floor."""
     curves = error_curves(result)
     objects = list(dict.fromkeys(c.object for c in curves))
     with styled():
@@ -65,7 +66,7 @@ def error_over_time(result: Result) -> Figure:
                 axes.axhline(result.noise_floor_m * 1e3, color=LIGHT["faint"], ls=":", lw=1)
             axes.set_yscale("log")
             axes.set_ylabel(f"error [m{result.unit}]")
-        figure.supxlabel("time after the command [s]", fontsize=8, color=LIGHT["soft"])
+        figure.supxlabel(f"time since {began(result, scene)} [s]", fontsize=8, color=LIGHT["soft"])
         figure.legend(loc="outside upper right", ncols=3)
     return figure
 

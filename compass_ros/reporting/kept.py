@@ -92,12 +92,13 @@ def write_trajectories(result: Result, path: Path, extras: ReportExtras | None =
     write_bytes(path, file.getvalue())
 
 
-def read_all(folder: Path) -> tuple[Result, ReportExtras]:
+def read_all(folder: str | Path) -> tuple[Result, ReportExtras]:
     """Everything that a calibration has left for tables, report and figures.
 
     Raises ConfigError where `folder` holds no result, an older one without trajectories, or files that do not belong
     together.
     """
+    folder = Path(folder)
     content = read_result(folder / RESULT)
     path = folder / TRAJECTORIES
     about, numbers = _load(path)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compass_ros.reporting.drawing import distance_map, error_m, plane
+from compass_ros.reporting.drawing import distance_map, error_m, in_place, plane
 from compass_ros.reporting.extras import ReportExtras, ResidualMap
 from compass_ros.reporting.words import MODELS, Model
 from compass_ros.types import Floats, Replay, Result
@@ -15,12 +15,12 @@ from compass_ros.types import Floats, Replay, Result
 
 @dataclass(frozen=True)
 class ErrorCurve:
-    """How far one model is from the recordings of one object, over the shot."""
+    """How far one model is from the recordings of one object, over the episode."""
 
     object: str
     model: Model
     time_s: Floats
-    """(B,) centres of equal intervals since the command."""
+    """(B,) centres of equal intervals since its beginning."""
     rms_m: Floats
     """(B,) over all episodes; NaN where nothing was seen."""
 
@@ -54,4 +54,5 @@ def judged(replays: Sequence[Replay]) -> tuple[Replay, ...]:
 
 def left_over(result: Result, extras: ReportExtras) -> ResidualMap | None:
     """What the calibrated simulator leaves over, without effects; None where no planar motion was recorded."""
-    return extras.residual_before or distance_map(result.replays, "calibrated", plane(result.replays))
+    placed = in_place(result)
+    return extras.residual_before or distance_map(placed, "calibrated", plane(placed))

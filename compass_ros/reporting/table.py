@@ -13,11 +13,11 @@ from rich.text import Text
 
 from compass_ros.reporting.checks import SUMMARY, assess, overall
 from compass_ros.reporting.numbers import MISSING, plain, thousandths, unit_text, value_pm, with_unit
+from compass_ros.reporting.verdicts import title
 from compass_ros.reporting.words import (
     MODEL_LABEL,
     MODELS,
     VERDICT_LEVEL,
-    VERDICT_TITLE,
     Level,
     fit_rmse,
     held_out_rmse,
@@ -53,7 +53,7 @@ def print_verdict(result: Result, out: Console) -> None:
             out.print(Text.assemble((f"{check.title}. ", STYLE[check.level]), check.detail))
     out.print(Text(f"Is the result good? {SUMMARY[level]}", STYLE[level]))
     verdict = result.mismatch.verdict
-    out.print(Text.assemble((f"{VERDICT_TITLE[verdict]}: ", STYLE[VERDICT_LEVEL[verdict]]), result.mismatch.sentence))
+    out.print(Text.assemble((f"{title(result.mismatch)}: ", STYLE[VERDICT_LEVEL[verdict]]), result.mismatch.sentence))
     if result.mismatch.next_experiment:
         out.print(Text.assemble(("Next experiment: ", "bold"), result.mismatch.next_experiment))
 

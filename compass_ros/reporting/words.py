@@ -138,7 +138,8 @@ def where_rows(where: Where, unit: Unit) -> tuple[tuple[str, str], ...]:
     if where.depends_on is not None:
         rows.append(("kind", KIND[where.depends_on]))
     if where.time_s is not None:
-        rows.append(("time", f"{where.time_s[0]:.2f} to {where.time_s[1]:.2f} s after the command"))
+        of = "the beginning" if hinges else "the command"
+        rows.append(("time", f"{where.time_s[0]:.2f} to {where.time_s[1]:.2f} s after {of}"))
     return tuple(rows)
 
 

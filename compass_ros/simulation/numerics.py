@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from compass_ros.cells import Cell
+from compass_ros.cells.far import far_from_scene
 from compass_ros.cells.rotors import PREFIX
 from compass_ros.types import Floats
 
@@ -67,7 +68,8 @@ def creeping(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[str, ...]:
 
 
 def unlike_scene(cell: Cell) -> Iterator[str]:
-    """In which numerics a cell is not simulated as its scene says, and why."""
+    """In what a cell is not simulated as its scene says, and why: its numerics, and numbers that are far from it."""
+    yield from far_from_scene(cell)
     if cell.holds:
         said = "simulated with dry friction that holds a joint at rest, which the scene should have (solreffriction, "
         yield f"{said}solimpfriction): with its own, joints creep that stand still in the recordings"

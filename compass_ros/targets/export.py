@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import mujoco
@@ -14,10 +15,14 @@ from compass_ros.targets.commands import commands_of
 from compass_ros.targets.control import write_control
 from compass_ros.targets.mjx import write_mjx
 from compass_ros.targets.plain_mjcf import write_plain
-from compass_ros.targets.said import Said
+from compass_ros.targets.said import Fate, Said
 from compass_ros.targets.urdf import is_urdf, write_urdf
 
 PLAIN, URDF, CONTROL, MJX = "plain.xml", "robot.urdf", "pid_controller.yaml", "laws_mjx.py"
+
+
+_REF = "the joint's ref: positions and commands go in as recorded"
+_SUBTRACT = "subtract {:.4g} from the measured position and from the command of a position servo"
 
 
 def export(folder: Path, cell: Cell, urdf: Path | None = None) -> dict[Path, tuple[Said, ...]]:
@@ -32,7 +37,10 @@ def export(folder: Path, cell: Cell, urdf: Path | None = None) -> dict[Path, tup
         raise ConfigError(f"{folder}: has no scene.xml; `compass calibrate` writes it beside result.json")
     model, told = mujoco.MjModel.from_xml_path(str(scene)), commands_of(cell, values)
     laws = read_effects(folder / "effects.yaml")
-    written = {folder / PLAIN: write_plain(scene, laws, told, folder / PLAIN)}
+    zeros = {p.of: values[p.name] for p in cell.spec.parameters if p.field == "joint_zero" and values[p.name]}
+    of_plain = write_plain(scene, laws, told, folder / PLAIN)
+    of_sensors = (*(_zero(joint, "exact", _REF) for joint in zeros), *_offsets(cell, values))
+    written = {folder / PLAIN: (*of_plain, *of_sensors)}
     if laws.effects or laws.sliding:
         written[folder / MJX] = write_mjx(scene, laws, folder / MJX)
     source = urdf or (cell.model_path if is_urdf(cell.model_path) else None)
@@ -40,7 +48,19 @@ def export(folder: Path, cell: Cell, urdf: Path | None = None) -> dict[Path, tup
         raise ConfigError(f"{urdf}: is no URDF; expected an XML document with <robot>")
     plain = mujoco.MjModel.from_xml_path(str(folder / PLAIN))
     if source is not None:
-        written[folder / URDF] = write_urdf(source, plain, folder / URDF)
+        without = (_zero(joint, "left out", _SUBTRACT.format(zero)) for joint, zero in zeros.items())
+        written[folder / URDF] = (*write_urdf(source, plain, folder / URDF), *without)
     if model.nu:
         written[folder / CONTROL] = write_control(model, told, folder / CONTROL)
     return written
+
+
+def _offsets(cell: Cell, values: Mapping[str, float]) -> Iterator[Said]:
+    """What sensors add, for which a scene has no word."""
+    for p in cell.spec.parameters:
+        if p.field.startswith("observed_offset") and values[p.name]:
+            yield Said(p.name, (p.of,), "left out", f"what is measured is {values[p.name]:.4g} {p.unit} more")
+
+
+def _zero(joint: str, fate: Fate, why: str) -> Said:
+    return Said("zero of the encoder", (joint,), fate, why)

@@ -89,6 +89,27 @@ def test_a_table_with_few_digits_does_not_conceal_the_step() -> None:
     assert encoder_step([np.radians(x) for x in degrees], FINEST) == pytest.approx(2 * np.pi / 4096, rel=1e-3)
 
 
+@pytest.mark.parametrize("decimals", [2, 3, 4, 6])
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_a_slow_motion_in_a_table_with_few_digits_does_not_either(motion: str, decimals: int) -> None:
+    """Of a joint that moves by less than a step a frame most second differences are the table's rounding alone."""
+    rng = np.random.default_rng(3)
+    slow = [np.interp(np.linspace(0, TIME[-1], 1500), TIME, MOTIONS[motion](rng)) for _ in range(4)]
+    step = 360 / 4096
+    said = [np.radians(np.round(np.round(np.degrees(x) / step) * step, decimals)) for x in slow]
+    assert encoder_step(said, FINEST) == pytest.approx(np.radians(step), rel=2e-3)
+
+
+@needs_real
+@pytest.mark.parametrize("decimals", [3, 4])
+def test_a_table_in_degrees_of_a_real_arm(decimals: int) -> None:
+    with np.load(REAL / "so101" / "motions.npz") as file:
+        said = [np.degrees(file[f"{name}.position"]) for name in ("chirp_sweep", "reaching_points", "static_holding")]
+    for joint in range(4):
+        printed = [np.radians(np.round(one[:, joint], decimals)) for one in said]
+        assert encoder_step(printed, FINEST) == pytest.approx(2 * np.pi / 4096, rel=1e-3)
+
+
 def test_gaps_and_a_glitch_do_not_matter() -> None:
     said = recorded("sticking", 0.001)
     said[0][50], said[1][::3] = 0.12345, np.nan

@@ -23,7 +23,7 @@ WRONG = [
     ("factors: [puck1, puck2]", "factors: [puck1, puk2]", "unknown object 'puk2'"),
     ("factors: [puck1, puck2]", "factors: [puck1, puck1]", "factors: puck1 stands twice"),
     ("factors: [puck1, puck2]", "factors: [{name: a, object: puck1, part: yaw}]", "tracked as xy, without yaw"),
-    ("quantity: xy, topic: /puck_tracker/puck1/pose", "quantity: xyw", "objects.0.quantity"),
+    ("quantity: xy, topic: /puck_tracker/puck1/pose", "quantity: xyw", "objects: puck1: quantity: expected"),
     ("{velocity: 0.0, angle: 0.0}", "{speed: 0.0}", "launch_noise: unknown name 'speed'"),
     ("right_wall@dyna@damping, env@camera@bias_x", "right_wal@dyna@damping, env@camera@bias_x", "right_wall@dyna"),
     ("reach: [-0.36, 0.02]", "reach: [-0.36, -0.3]", "reach [-0.36, -0.3] does not hold"),

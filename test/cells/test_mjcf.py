@@ -180,7 +180,7 @@ def test_commands_are_held_for_their_time_and_scaled(tmp_path: Path) -> None:
         ({"parameters": [parameter("a@b@c", "table_load", "cube")]}, "no table_friction"),
         ({"parameters": [parameter("a@b@c", "observed_offset[7]", "cube")]}, "found index 7"),
         ({"start": [{"object": "cub"}]}, "did you mean 'cube'"),
-        ({"start": [{"object": "cube", "noise": {"speed": 1}}]}, "start.0.noise"),
+        ({"start": [{"object": "cube", "noise": {"speed": 1}}]}, "start: cube: noise: speed: expected"),
         ({"action": [{"name": "a", "unit": "m", "low": 0, "high": 1}]}, "expected qpos[i], qvel[i] or ctrl"),
     ],
 )  # fmt: skip

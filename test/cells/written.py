@@ -12,6 +12,7 @@ import numpy as np
 import yaml
 
 from compass_ros.cells import Cell, load
+from compass_ros.cells.physical import NOT_NEGATIVE
 from compass_ros.types import Floats
 
 TOSS = """
@@ -73,8 +74,9 @@ DERIVED = {"geom_aabb", "geom_sameframe", "body_sameframe", "bvh_aabb"} if mujoc
 
 
 def parameter(name: str, field: str, of: str = "", default: float = 0.0, width: float = 1.0) -> dict[str, object]:
-    """A parameter whose bounds are ten half widths away."""
-    bounds = [default - 10 * width, default + 10 * width]
+    """A parameter whose bounds are ten half widths away, or 0 below what cannot be negative."""
+    low = default - 10 * width
+    bounds = [max(low, 0.0) if field.partition("[")[0] in NOT_NEGATIVE else low, default + 10 * width]
     return {
         "name": name,
         "default": default,

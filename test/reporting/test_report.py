@@ -17,6 +17,8 @@ from compass_ros.reporting.drawing import MAX_REPLAYS, distance_map, figure_data
 from compass_ros.reporting.numbers import MISSING
 from compass_ros.reporting.report import embedded_json, render
 from compass_ros.reporting.view.gap import ladder
+from compass_ros.reporting.view.page import questions
+from compass_ros.reporting.view.parameters import told_rows
 from compass_ros.reporting.words import VERDICT_TITLE
 from compass_ros.types import Gap, Graph, Replay, ReplayedTrack, Result, Verdict
 
@@ -107,8 +109,8 @@ def test_every_parameter_is_in_the_heat_map(outline: Outline, result: Result) ->
 
 def test_held_out_episodes_come_first_and_are_marked(outline: Outline, result: Result) -> None:
     drawn = [(e["name"], e["held_out"]) for e in outline.figures()["episodes"]]
-    assert [name for name, held_out in drawn if held_out] == list(result.held_out)
-    assert [name for name, _ in drawn][: len(result.held_out)] == list(result.held_out)
+    assert {name for name, held_out in drawn if held_out} == set(result.held_out)
+    assert [held_out for _, held_out in drawn] == sorted((held_out for _, held_out in drawn), reverse=True)
     assert outline.said().count("held out") >= len(result.held_out)
 
 
@@ -263,4 +265,27 @@ def test_many_episodes_are_cut_and_it_is_said(result: Result) -> None:
     many = replace(result, replays=result.replays * 6)
     page = Outline(render(many, ReportExtras()))
     assert len(page.figures()["episodes"]) == MAX_REPLAYS
-    assert f"{12 * 6 - MAX_REPLAYS} further episodes are not drawn" in page.said()
+    assert f"{12 * 6 - MAX_REPLAYS} further episodes are not drawn: fitted, with the smallest errors." in page.said()
+
+
+def test_parameters_that_can_be_told_come_first_and_alone_are_counted(result: Result) -> None:
+    sure, doubtful, still = (next(r for r in result.parameters if r.name == f"puck{i}@dyna@mass") for i in (1, 2, 1))
+    sure = replace(sure, value=0.03, std=0.001, active=False, identifiable=True)
+    doubtful = replace(doubtful, value=0.08, std=0.001, active=True, identifiable=False)
+    still = replace(still, name="still", std=0.001, active=True, identifiable=True)
+    few = replace(result, parameters=(doubtful, still, sure))
+    assert [row.name for row in told_rows(few)] == [sure.name, "still", doubtful.name]
+    first = questions(few)[0]
+    assert first["answer"] == "1 of 3"
+    assert first["detail"].startswith("were wrong; 1 more moved but is not identifiable; 2 have an edge")
+    assert [p["identifiable"] for p in figure_data(few, ReportExtras())["calibration"]["parameters"]] == [
+        False,
+        True,
+        True,
+    ]
+
+
+def test_what_a_trajectory_difference_is_is_said_beside_its_curves(outline: Outline) -> None:
+    said = outline.said()
+    assert "averaged over the fitted episodes" in said.partition("How they moved")[2]
+    assert "summed over time" in said.partition("Which parameters cause the difference")[2]

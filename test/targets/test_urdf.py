@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import mujoco
@@ -29,6 +30,13 @@ URDF = """<robot name="two"><link name="base"/>
 <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0 0 -0.4"/>
   <axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="9" velocity="9"/><dynamics damping="0.1" friction="0"/></joint>
 <joint name="fixed" type="fixed"><parent link="lower"/><child link="tool"/><origin xyz="0 0 -0.3"/></joint></robot>"""
+
+
+SWING = """<robot name="swing"><link name="world"/>
+<link name="arm"><inertial><origin xyz="0 0 -0.35"/><mass value="0.2"/>
+  <inertia ixx="0.005" ixy="0" ixz="0" iyy="0.005" iyz="0" izz="0.0001"/></inertial></link>
+<joint name="swing" type="revolute"><parent link="world"/><child link="arm"/><axis xyz="0 1 0"/>
+  <limit lower="-3" upper="3" effort="9" velocity="9"/></joint></robot>"""
 
 
 def pushed(model: mujoco.MjModel) -> Floats:
@@ -92,7 +100,26 @@ def test_a_result_is_exported_by_one_command(tmp_path: Path, run: Run) -> None:
     status, out, err = run("export", tmp_path)
     assert (status, err) == (0, "")
     assert "plain.xml" in out
+    assert re.search(r"encoder@sensing@offset on swing: left out \(what is measured is [-\d.]+ rad more\)", out)
     mujoco.MjModel.from_xml_path(str(tmp_path / "plain.xml"))
     status, _, err = run("export", tmp_path / "nothing")
     assert status == 1
     assert len(err.splitlines()) == 1
+
+
+@pytest.mark.slow
+def test_zeros_of_encoders_are_said(tmp_path: Path, run: Run) -> None:
+    """In the scene they are its joint's ref; a URDF has no word for them."""
+    text = (ROOT / "examples" / "own_cell" / "pendulum.yaml").read_text(encoding="utf-8")
+    scene = str(ROOT / "examples" / "own_cell" / "pendulum.xml")
+    text = text.replace("observed_offset[0]", "joint_zero").replace("pendulum.xml", scene)
+    cell, urdf = tmp_path / "cell.yaml", tmp_path / "arm.urdf"
+    cell.write_text(text, encoding="utf-8")
+    urdf.write_text(SWING, encoding="utf-8")
+    bags = [ROOT / "examples" / "own_cell" / "bags" / f"swing_{number}" for number in (1, 2)]
+    given = ("--cell", cell, "--no-discover", "--progress", "none", "--out", tmp_path / "out")
+    assert run("calibrate", *given, *bags)[0] == 0
+    out = run("export", tmp_path / "out", "--urdf", urdf)[1]
+    assert "zero of the encoder on swing: exact (the joint's ref" in out
+    zero = float(re.findall(r"zero of the encoder on swing: left out \(subtract ([-\d.e]+) from", out)[0])
+    assert mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "plain.xml")).qpos0[0] == pytest.approx(zero, rel=1e-3)

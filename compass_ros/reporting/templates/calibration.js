@@ -44,14 +44,14 @@ if (calibration.difference_rollouts.length < 2) {
   document.getElementById("moved").remove();
 } else {
   const wide = document.getElementById("convergence"), small = document.getElementById("curves");
-  const difference = panel(wide, "Mean trajectory difference, fitted episodes");
+  const difference = panel(wide, "Mean trajectory difference");
   whenSeen(difference, () => drawDifference(difference));
   if (calibration.sparsity.some((s) => s !== null)) {
     const sparsity = panel(wide, "Entries of the graph under the threshold");
     whenSeen(sparsity, () => drawSparsity(sparsity));
   }
   const moved = (p) => Math.abs(p.value - p.default) / (p.bounds[1] - p.bounds[0] || 1);
-  for (const p of [...calibration.parameters].filter((q) => q.path.length).sort((a, b) => moved(b) - moved(a)).slice(0, MAX_CURVES)) {
+  for (const p of [...calibration.parameters].filter((q) => q.path.length).sort((a, b) => b.identifiable - a.identifiable || moved(b) - moved(a)).slice(0, MAX_CURVES)) {
     const target = panel(small, p.name, true);
     whenSeen(target, () => drawCurve(target, p));
   }

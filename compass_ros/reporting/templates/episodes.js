@@ -1,11 +1,11 @@
-// The chosen episode: trajectories on the table, errors over time, and one moment marked in both.
+// The chosen episode: trajectories in the plane, signals and errors over time, and one moment marked in all.
 const tablePlot = document.getElementById("table-plot");
+const signalPlot = document.getElementById("signal-plot");
 const errorPlot = document.getElementById("error-plot");
 const curves = [{ key: "real", label: "recorded" }, ...data.models];
 const shown = Object.fromEntries(curves.map((curve) => [curve.key, true]));
 let episode = 0;
 
-const planar = (track) => track.real.length === 2;
 const nearest = (times, t) => times.reduce((best, time, i) => (Math.abs(time - t) < Math.abs(times[best] - t) ? i : best), 0);
 
 const curveTrace = (track, curve) => {
@@ -45,36 +45,71 @@ const drawTable = () => {
   });
 };
 
+// One panel under the other on one time axis; the last has its numbers.
+const timeAxis = (rows) => axis({ title: label(`time since ${data.began} [s]`), anchor: `y${rows > 1 ? rows : ""}`, showspikes: true, spikemode: "across", spikethickness: 1, spikedash: "solid", spikecolor: colour("faint") });
+const span = (tracks) => {
+  const times = tracks.map((track) => track.time).filter((time) => time.length);
+  return [Math.min(...times.map((time) => time[0])), Math.max(...times.map((time) => time[time.length - 1]))];
+};
+const panelDomain = (i, rows, gap) => [1 - (i + 1) / rows + (i < rows - 1 ? gap : 0), 1 - i / rows - gap];
+const panelTitle = (content, i, rows, gap) => ({ xref: "paper", x: 0, yref: "paper", y: 1 - i / rows - gap, yanchor: "bottom", xanchor: "left", showarrow: false, text: content, font: { size: 12, color: colour("soft") } });
+
+const signalsOf = (chosen) => chosen.tracks.filter((track) => !planar(track)).flatMap((track) => track.columns.map((column, k) => ({ ...column, k, track })));
+const withUnit = ({ name, unit }) => text(unit ? `${name} [${unit}]` : name);
+
+const signalTrace = ({ track, k, unit }, curve, n) => {
+  const real = curve.key === "real", style = STYLE[curve.key];
+  return {
+    x: track.time, y: track[curve.key][k], yaxis: `y${n}`, type: "scatter", mode: real ? "markers" : "lines", name: curve.label,
+    marker: { size: 4.5, color: faded("real", 0.3) }, line: { color: colour(curve.key), width: style.width, dash: style.dash },
+    hovertemplate: `%{y:.4f} ${text(unit)} ${curve.label}<extra></extra>`,
+  };
+};
+
+const drawSignals = () => {
+  const signals = signalsOf(data.episodes[episode]), rows = signals.length, narrow = signalPlot.clientWidth < 480;
+  signalPlot.hidden = !rows;
+  if (!rows) return;
+  const visible = curves.filter((curve) => shown[curve.key]), gap = 0.16 / rows, axes = {};
+  const traces = signals.flatMap((signal, i) => visible.filter((c) => signal.track[c.key]).map((c) => signalTrace(signal, c, i ? i + 1 : "")));
+  signals.forEach((_, i) => { axes[`yaxis${i ? i + 1 : ""}`] = axis({ domain: panelDomain(i, rows, gap), nticks: 5 }); });
+  draw(signalPlot, traces, {
+    ...axes, annotations: signals.map((signal, i) => panelTitle(withUnit(signal), i, rows, gap)), shapes: [], hovermode: "x unified",
+    height: rows * (narrow ? 105 : 118) + 46, margin: { l: 8, r: 8, t: 6, b: 4 }, xaxis: { ...timeAxis(rows), range: span(signals.map(({ track }) => track)) },
+  });
+};
+
 // Thousandths of the unit; far below the noise nothing is worth a look, and a logarithm needs an end.
 const LOWEST = 0.02;
 
 const drawErrors = () => {
   const tracks = data.episodes[episode].tracks, rows = tracks.length, narrow = errorPlot.clientWidth < 480;
   const traces = [], shapes = [], annotations = [], axes = {};
-  const top = Math.max(...tracks.flatMap((t) => data.models.flatMap((m) => t.error_mm[m.key] || [0])).filter((v) => v !== null), data.floor_mm || 0, 1);
+  const top = Math.max(...tracks.flatMap((t) => data.models.flatMap((m) => t.error_mm[m.key] || [0])).filter((v) => v !== null), ...tracks.map((t) => t.floor_mm || 0), 1);
   tracks.forEach((track, i) => {
-    const n = i ? i + 1 : "", gap = 0.09 / rows;
+    const n = i ? i + 1 : "", gap = 0.09 / rows, unit = text(track.error_unit);
     axes[`yaxis${n}`] = axis({
-      type: "log", range: [Math.log10(LOWEST), Math.log10(top) + 0.15], domain: [1 - (i + 1) / rows + (i < rows - 1 ? gap : 0), 1 - i / rows - gap],
-      title: label(data.unit), tickvals: [0.1, 1, 10, 100, 1000], ticktext: ["0.1", "1", "10", "100", "1000"],
+      type: "log", range: [Math.log10(LOWEST), Math.log10(top) + 0.15], domain: panelDomain(i, rows, gap),
+      title: label(unit), tickvals: [0.1, 1, 10, 100, 1000], ticktext: ["0.1", "1", "10", "100", "1000"],
     });
     for (const model of data.models.filter((m) => shown[m.key] && track.error_mm[m.key])) {
       const style = STYLE[model.key];
       traces.push({
         x: track.time, y: track.error_mm[model.key].map((e) => (e === null ? null : Math.max(e, LOWEST))), yaxis: `y${n}`, type: "scatter", mode: "lines", name: model.label,
-        line: { color: colour(model.key), width: style.width - 0.3, dash: style.dash }, hovertemplate: `%{y:.2f} ${data.unit} ${model.label}<extra></extra>`,
+        line: { color: colour(model.key), width: style.width - 0.3, dash: style.dash }, hovertemplate: `%{y:.2f} ${unit} ${model.label}<extra></extra>`,
       });
     }
-    if (data.floor_mm) shapes.push({ type: "line", xref: "paper", x0: 0, x1: 1, yref: `y${n}`, y0: data.floor_mm, y1: data.floor_mm, line: { color: colour("faint"), width: 1.2, dash: "dot" } });
-    annotations.push({ xref: "paper", x: 0, yref: "paper", y: 1 - i / rows - gap, yanchor: "bottom", xanchor: "left", showarrow: false, text: `${text(track.object)}: distance to the recording${i === 0 && data.floor_mm ? "; dotted: noise" : ""}`, font: { size: 12, color: colour("soft") } });
+    if (track.floor_mm) shapes.push({ type: "line", xref: "paper", x0: 0, x1: 1, yref: `y${n}`, y0: track.floor_mm, y1: track.floor_mm, line: { color: colour("faint"), ...NOISE } });
+    annotations.push(panelTitle(`${text(track.object)}: distance to the recording`, i, rows, gap));
   });
   draw(errorPlot, traces, {
     ...axes, shapes, annotations, hovermode: "x unified", height: rows * (narrow ? 150 : 165) + 46, margin: { l: 8, r: 8, t: 6, b: 4 },
-    xaxis: axis({ title: label("time since the command [s]"), anchor: `y${rows > 1 ? rows : ""}`, showspikes: true, spikemode: "across", spikethickness: 1, spikedash: "solid", spikecolor: colour("faint") }),
+    xaxis: { ...timeAxis(rows), range: span(tracks) },
   });
 };
 
 const markMoment = (t) => {
+  if (!signalPlot.hidden) Plotly.relayout(signalPlot, { shapes: t === null ? [] : [{ type: "line", yref: "paper", x0: t, x1: t, y0: 0, y1: 1, line: { color: colour("faint"), width: 1 } }] });
   const tracks = data.episodes[episode].tracks.filter(planar);
   if (!tracks.length) return;
   const first = tablePlot.data.length - curves.length, at = tracks.map((track) => nearest(track.time, t));
@@ -82,7 +117,7 @@ const markMoment = (t) => {
   Plotly.restyle(tablePlot, { x: pick(0), y: pick(1) }, curves.map((_, i) => first + i));
 };
 
-const drawEpisode = () => { drawTable(); drawErrors(); };
+const drawEpisode = () => { drawTable(); drawSignals(); drawErrors(); };
 
 const choose = (index, focus) => {
   episode = index;
@@ -96,7 +131,7 @@ const choose = (index, focus) => {
 };
 
 const sample = (key) => {
-  const line = { nominal: "1.5 3.5", calibrated: "6 4", with_effects: "none" }[key];
+  const line = { nominal: "1.5 3.5", calibrated: "6 4", with_effects: "none", faint: "0.1 4" }[key];
   const mark = key === "real" ? [3, 10, 17].map((x) => `<circle cx="${x}" cy="5" r="2.1" fill="var(--real)"/>`).join("")
     : `<path d="M1 5h18" stroke="var(--${key.replace("_", "-")})" stroke-width="2.4" stroke-linecap="round" stroke-dasharray="${line}"/>`;
   return `<svg width="20" height="10" viewBox="0 0 20 10" aria-hidden="true">${mark}</svg>`;
@@ -115,6 +150,11 @@ if (data.episodes.length) {
       button.setAttribute("aria-pressed", shown[curve.key]);
       drawEpisode();
     });
+  }
+  if (data.episodes.some((e) => e.tracks.some((track) => track.floor_mm))) {
+    const noise = element("span", "", legend);
+    noise.innerHTML = sample("faint");
+    noise.append("noise floor");
   }
   for (const button of document.querySelectorAll("[data-episode]")) {
     button.addEventListener("click", () => choose(Number(button.dataset.episode), false));

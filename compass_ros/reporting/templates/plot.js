@@ -64,6 +64,10 @@ const whenSeen = (target, paint) => {
   redraws.push(() => seen && paint());
 };
 
+// A track without columns is a place in the plane; one with columns is a signal over time.
+const planar = (track) => !track.columns.length;
+
+const NOISE = { width: 1.6, dash: "1.6px,3px" };
 const STYLE = {
   real: { width: 0, dash: "solid" },
   nominal: { width: 1.6, dash: "dot" },
@@ -98,7 +102,7 @@ const sceneMarks = () => data.scene.shapes.filter((shape) => shape.role === "goa
 // What every drawing on the table shows: the table and all recorded motion, with a small margin.
 const extent = () => {
   const box = [...(tableBox() || [Infinity, -Infinity, Infinity, -Infinity])];
-  for (const track of data.episodes.flatMap((e) => e.tracks).filter((t) => t.real.length === 2)) {
+  for (const track of data.episodes.flatMap((e) => e.tracks).filter(planar)) {
     track.real[0].forEach((x, i) => {
       const y = track.real[1][i];
       if (x === null || y === null) return;

@@ -6,10 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from compass_ros.reporting.drawing import MAX_REPLAYS, chosen, episode_rmse
+from compass_ros.reporting.drawing import chosen, episode_rmse
 from compass_ros.reporting.numbers import plain, thousandths, unit_text
+from compass_ros.reporting.windows import by_recording, counted, word
 from compass_ros.reporting.words import MODEL_LABEL, MODELS, Model, best_model, fit_rmse, held_out_rmse
-from compass_ros.types import Gap, Result
+from compass_ros.types import Gap, Replay, Result
 
 SMALL = ("m", "rad")
 """Units of which errors are shown in thousandths."""
@@ -59,7 +60,9 @@ def ladder(result: Result) -> dict[str, Any]:
             }
         )
     return {
-        "on": "episodes that were never fitted" if unseen else "the fitted episodes, for none was held out",
+        "on": f"{word(result)}s that were never fitted"
+        if unseen
+        else f"the fitted {word(result)}s, for none was held out",
         "rows": rows,
         "ticks": scale.ticks(result.unit),
         "floor": scale.place(result.noise_floor_m),
@@ -111,7 +114,7 @@ def signals(result: Result) -> dict[str, Any]:
         for s, part, floor in found
     ]
     unseen = all("held_out" in parts for parts in result.gap.values())
-    on = "episodes that were never fitted" if unseen else "the fitted episodes"
+    on = f"{word(result)}s that were never fitted" if unseen else f"the fitted {word(result)}s"
     return {"rows": rows if len(rows) > 1 else [], "floor": scale.place(1.0), "on": on}
 
 
@@ -140,8 +143,8 @@ def _error(gap: Gap, signal: str, part: str) -> float:
 
 
 def episodes(result: Result) -> dict[str, Any]:
-    """The episode selector: error of each model in each episode, on one logarithmic line."""
-    replays = chosen(result.replays)
+    """The episode selector: error of each model in each episode, on one logarithmic line; the worst ones first."""
+    replays, others = chosen(result)
     errors = {(i, m): episode_rmse(r, m) for i, r in enumerate(replays) for m in MODELS}
     scale = LogScale([*errors.values(), result.noise_floor_m])
     best = best_model(result)
@@ -149,7 +152,7 @@ def episodes(result: Result) -> dict[str, Any]:
         {
             "index": i,
             "name": replay.episode,
-            "held_out": replay.held_out,
+            **_who(replay),
             "dots": [
                 {"key": m, "place": scale.place(errors[i, m])} for m in MODELS if scale.place(errors[i, m]) is not None
             ],
@@ -157,6 +160,23 @@ def episodes(result: Result) -> dict[str, Any]:
         }
         for i, replay in enumerate(replays)
     ]
-    left_out = max(len(result.replays) - MAX_REPLAYS, 0)
     ticks, floor = scale.ticks(), scale.place(result.noise_floor_m)  # the column's head has the unit
-    return {"rows": rows, "ticks": ticks, "floor": floor, "left_out": left_out}
+    order = f"Held-out {word(result)}s first, then fitted ones; of each the one with the largest error "
+    order += f"({MODEL_LABEL[best]}, rms) on top."
+    return {"rows": rows, "ticks": ticks, "floor": floor, "order": order, "not_drawn": _not_drawn(others, word(result))}
+
+
+def _who(replay: Replay) -> dict[str, str]:
+    """Its recording, and in small type where in it a window begins and whether it was held out."""
+    ((recording, start),) = by_recording([replay.episode])
+    return {"recording": recording, "note": ", ".join(filter(None, [start, "held out" if replay.held_out else ""]))}
+
+
+def _not_drawn(replays: Sequence[Replay], what: str) -> str:
+    """How many episodes are not drawn, and which; empty where all are."""
+    if not replays:
+        return ""
+    unseen, one = sum(replay.held_out for replay in replays), len(replays) == 1
+    which = f"those fitted, and {unseen} held out" if 0 < unseen < len(replays) else "held out" if unseen else "fitted"
+    smallest = f"with the smallest error{'' if one else 's'}"
+    return f"{counted(len(replays), f'further {what}')} {'is' if one else 'are'} not drawn: {which}, {smallest}."

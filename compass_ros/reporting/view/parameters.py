@@ -26,8 +26,17 @@ def _moved(row: ParameterRow) -> float:
 
 
 def told_rows(result: Result) -> list[ParameterRow]:
-    """Parameters that were wrong or have an edge: the wrong ones first, among each the most moved one."""
-    return sorted((row for row in result.parameters if told(row)), key=lambda r: (r.wrong, _moved(r)), reverse=True)
+    """Parameters that were wrong or have an edge: those that the recordings can tell first, and of them the wrong ones.
+
+    Of each the most moved one is first.
+    """
+    rows = (row for row in result.parameters if told(row))
+    return sorted(rows, key=lambda r: (r.identifiable, r.wrong, _moved(r)), reverse=True)
+
+
+def surely_wrong(row: ParameterRow) -> bool:
+    """Whether its default was wrong, as far as the recordings can tell it from others."""
+    return row.wrong and row.identifiable
 
 
 def _strip(row: ParameterRow, truth: float | None) -> dict[str, Any]:

@@ -13,6 +13,7 @@ import pytest
 from compass_ros.reporting import Candidate, ReportExtras, write_report
 from compass_ros.types import Result, Verdict
 from test.by_night import but
+from test.reporting.arm import arm
 
 if TYPE_CHECKING:
     from test.reporting.browser.conftest import Page
@@ -47,8 +48,10 @@ def test_draws_quietly_and_fits(page: Page, report: Path, size: str, dark: bool,
     page.settle()
     quiet(page, report)
     assert page.evaluate("document.documentElement.scrollWidth") == SIZES[size]
-    assert page.evaluate("document.querySelectorAll('.plot').length") == 16
-    assert page.evaluate("[...document.querySelectorAll('.plot')].every((p) => p.querySelector('.main-svg'))")
+    assert page.evaluate("document.querySelectorAll('.plot:not([hidden])').length") == 16
+    assert page.evaluate(
+        "[...document.querySelectorAll('.plot:not([hidden])')].every((p) => p.querySelector('.main-svg'))"
+    )
     assert (background(page) < 60) is dark
     folder = Path(os.environ.get("COMPASS_SCREENSHOTS", tmp_path))
     picture = folder / f"report_{size}_{'dark' if dark else 'light'}.png"
@@ -102,6 +105,59 @@ def test_pointing_at_an_error_marks_the_moment_on_the_table(page: Page, report: 
     page.evaluate("new Promise((done) => setTimeout(done, 150))")
     assert any(traces(page, "table-plot", "t.marker && t.marker.symbol === 'circle-open' && t.x.length === 2"))
     quiet(page, report)
+
+
+@pytest.fixture
+def of_arm(result: Result, tmp_path: Path) -> Path:
+    path = tmp_path / "report.html"
+    write_report(arm(result), path)
+    return path
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_signals_are_drawn_as_they_were_recorded(page: Page, of_arm: Path, size: str) -> None:
+    page.show(of_arm, SIZES[size])
+    page.settle()
+    assert page.evaluate("document.documentElement.scrollWidth") == SIZES[size]
+    assert page.evaluate("document.getElementById('table-plot').hidden")
+    names = traces(page, "signal-plot", "t.name")
+    assert names == ["recorded", "nominal", "calibrated"] * 5  # two joints, three numbers of the imu
+    titles = page.evaluate("document.getElementById('signal-plot').layout.annotations.map((a) => a.text)")
+    assert titles[:3] == ["joints.elbow [rad]", "joints.wrist [rad]", "imu wx [rad/s]"]
+    recorded, nominal = traces(page, "signal-plot", "t.y[10]")[:2]
+    assert nominal - recorded == pytest.approx(0.1, abs=1e-4)
+    for plot in ("signal-plot", "error-plot"):
+        title = page.evaluate(f"document.getElementById('{plot}').layout.xaxis.title.text")
+        assert title == "time since the window began [s]"
+    quiet(page, of_arm)
+
+
+def test_the_noise_floor_is_in_the_legend_and_dotted_in_each_panel(page: Page, of_arm: Path) -> None:
+    page.show(of_arm, 1280)
+    assert page.evaluate("document.querySelector('#legend > span').textContent") == "noise floor"
+    lines = page.evaluate("document.getElementById('error-plot').layout.shapes.map((s) => [s.y0, s.line])")
+    assert [y for y, _ in lines] == [0.5, 0.5, 30.0]
+    assert {line["dash"] for _, line in lines} == {f"{line['width']}px,3px" for _, line in lines}  # dots, not dashes
+
+
+def test_pointing_at_an_error_marks_the_moment_in_the_signals(page: Page, of_arm: Path) -> None:
+    page.show(of_arm, 1280)
+    page.evaluate("document.getElementById('error-plot').emit('plotly_hover', {points: [{x: 1.5}]})")
+    marks = "document.getElementById('signal-plot').layout.shapes.map((s) => s.x0)"
+    assert page.evaluate(marks) == [1.5]
+    page.evaluate("document.getElementById('error-plot').emit('plotly_unhover', {})")
+    assert page.evaluate(marks) == []
+
+
+@pytest.mark.parametrize("width", [360, 420, 560])
+def test_the_whole_menu_is_on_a_narrow_screen(page: Page, report: Path, width: int) -> None:
+    page.show(report, width)
+    ends = page.evaluate("[...document.querySelectorAll('.bar nav a')].map((a) => a.getBoundingClientRect().right)")
+    assert len(ends) == 6
+    assert max(ends) <= width
+    assert page.evaluate(
+        "document.querySelector('.bar nav').scrollWidth <= document.querySelector('.bar nav').clientWidth"
+    )
 
 
 def test_the_theme_can_be_switched(page: Page, report: Path) -> None:
