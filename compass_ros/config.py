@@ -90,9 +90,10 @@ class CalibrationConfig:
         default=100, ge=1, description="most episodes that are used; of more, so many are taken evenly over their order"
     )
     windows: int = Field(
-        default=40,
-        ge=1,
-        description="most windows of long recordings that are fitted; of more, those that are most unlike each other",
+        default=0,
+        ge=0,
+        description="most windows of long recordings that are fitted, those that are most unlike each other; 0: 100 s "
+        "of them, 10 to 40",
     )
     threads: int = Field(default=0, ge=0, description="threads for rollouts; 0: all cores. Results do not depend on it")
     compass: CompassConfig = Field(default_factory=CompassConfig, description="of the method `compass`, fields below")

@@ -19,7 +19,7 @@ from compass_ros.estimation import estimate_parameters
 from compass_ros.planning.next_experiment import with_next
 from compass_ros.posing import Posed, noise_of
 from compass_ros.progress import Steady
-from compass_ros.selection import evenly, split, unlike
+from compass_ros.selection import evenly, most_windows, split, unlike
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.numerics import unlike_scene
 from compass_ros.simulation.replay import recordings
@@ -68,7 +68,8 @@ def _calibrate(
 
     fit, held_out = split(used, config)
     cut = windows(cell, fit)
-    data = recordings(cell, unlike(cell, cut, config.windows) if cell.spec.windows else evenly(cut, config.episodes))
+    most = config.windows or most_windows(cell.spec.windows.length_s) if cell.spec.windows else config.episodes
+    data = recordings(cell, unlike(cell, cut, most) if cell.spec.windows else evenly(cut, most))
     judge = recordings(cell, evenly(windows(cell, held_out or fit), config.episodes)).numbered(len(data.names))
     simulator = simulator.driven(data.drives + judge.drives)
     noise = noise_of(cell, data)

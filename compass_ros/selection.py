@@ -14,6 +14,11 @@ from compass_ros.simulation.windows import least_motion, ranges
 from compass_ros.types import Episode, Floats, Track
 
 _NS = 1e-9
+TOGETHER_S = 100.0
+"""Of windows that are fitted: a budget. An SO-101 fitted to 40, 20 and 8 windows of 5 s is off by 6.1, 6.0 and 6.1 mrad
+in the 135 windows of a week that it has not seen (docs/first-day.md)."""
+WINDOWS = (10, 40)
+"""Fewest and most of them."""
 
 
 def evenly(episodes: Sequence[Episode], most: int) -> list[Episode]:
@@ -25,6 +30,11 @@ def evenly(episodes: Sequence[Episode], most: int) -> list[Episode]:
     if len(ordered) <= most:
         return ordered
     return [ordered[i] for i in np.round(np.linspace(0, len(ordered) - 1, most)).astype(int)]
+
+
+def most_windows(length_s: float) -> int:
+    """How many windows of a length are fitted where nobody says it."""
+    return int(np.clip(round(TOGETHER_S / length_s), *WINDOWS))
 
 
 def unlike(cell: Cell, windows: Sequence[Episode], most: int) -> list[Episode]:

@@ -11,7 +11,7 @@ import pytest
 from compass_ros.cells import Cell, load
 from compass_ros.config import CalibrationConfig
 from compass_ros.errors import DataError
-from compass_ros.selection import evenly, split, traits, unlike
+from compass_ros.selection import evenly, most_windows, split, traits, unlike
 from compass_ros.types import Episode, Floats, Track
 
 START = 1_700_000_000_000_000_000
@@ -135,3 +135,7 @@ def test_numbers_that_were_not_seen_are_no_reason(arm: Cell) -> None:
     assert np.isfinite(held).all()
     lone = replace(some[4], tracks=(replace(track, stamp_ns=track.stamp_ns[:0], value=track.value[:0]),))
     assert np.isfinite(traits(arm, [*some[:4], lone, *some[5:]])).all()
+
+
+def test_a_hundred_seconds_of_windows_are_fitted_where_nobody_says_how_many() -> None:
+    assert [most_windows(length) for length in (0.5, 2.5, 5.0, 8.0, 60.0)] == [40, 40, 20, 12, 10]

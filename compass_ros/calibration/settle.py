@@ -29,9 +29,6 @@ are compared by whole units."""
 WORTHWHILE = 0.05
 """Share of what is left above the noise that all steps with the same differences must gain: where something else
 differs, exact values are of no use. A budget."""
-ROUGH_DIFFERENCES = 30.0
-"""What a fit by one-sided differences leaves [log likelihood]: tens, on that arm. Where steps that gain less are the
-last ones anyway, central ones are of no use."""
 _DAMPING = (1e-9, 1e-3, 1e-2, 1e-1, 1.0, 1e1)
 """Damping factors that are tried at once at the end."""
 
@@ -43,16 +40,15 @@ def settled(likelihood: Likelihood, fit: Fit) -> Fit:
     some per cent, as those of `minimise` are, end there, tens of log likelihood above the optimum. What a step has
     shown is added to them (Broyden): the shapes of a field bend the valley. Where the simulator is smooth the short
     ones are exact enough from one side (a seven-joint arm ends at 14,756.04 with either); elsewhere they are central,
-    with both lengths in turn, unless much is left that no parameter explains. Valleys are followed with the differences
-    across them as they are.
+    with both lengths in turn. Valleys are followed with the differences across them as they are.
     """
+    rounds = 1 if likelihood.smooth else len(FINE)
     free, robust, linear = fit.free, fit.robust, fit.linear
     point = replace(fit.point, cost=float(cost(likelihood, [fit.point], robust)[0][0]))
     for taken in range(SETTLING):
         before = point.cost
         length = FINE[-1] if likelihood.smooth else max(FINE[taken % len(FINE)], likelihood.roughness)
-        from_one_side = likelihood.smooth or _last(likelihood, point) > ROUGH_DIFFERENCES
-        take, rounds = (linearise, 1) if from_one_side else (central, len(FINE))
+        take = linearise if likelihood.smooth else central
         linear = take(likelihood, point, free, length * difference_steps(linear), linear.onset)
         for _ in range(BENDS):
             begun = point.cost

@@ -133,11 +133,11 @@ def solve(tangent: Tangent, normal: Normal, spread: Floats | None) -> Solved:
     own, hats, q = slice(p, p + own_numbers), p + own_numbers + on, mixed.shape[2]
     inner = np.empty((len(gram), own_numbers + q, own_numbers + q))
     inner[:, :own_numbers, :own_numbers] = gram[:, own, own]
-    inner[:, :own_numbers, own_numbers:] = np.ascontiguousarray(gram[:, own][:, :, hats]) @ mixed
+    inner[:, :own_numbers, own_numbers:] = block(gram, np.r_[own], hats) @ mixed
     inner[:, own_numbers:, :own_numbers] = inner[:, :own_numbers, own_numbers:].transpose(0, 2, 1)
-    inner[:, own_numbers:, own_numbers:] = turned @ np.ascontiguousarray(gram[:, hats][:, :, hats]) @ mixed
+    inner[:, own_numbers:, own_numbers:] = turned @ block(gram, hats, hats) @ mixed
     factor = cholesky(inner + np.eye(own_numbers + q))
-    half = np.linalg.solve(factor, np.concatenate([gram[:, own, :p], turned @ gram[:, hats, :p]], axis=1))
+    half = np.linalg.solve(factor, np.concatenate([gram[:, own, :p], turned @ block(gram, hats, np.arange(p))], axis=1))
     taken, whole = np.einsum("eij,eik->jk", half, half), gram[:, :p, :p].sum(axis=0)
     outer = cholesky(whole - taken + np.diag(1 + ROUNDING * np.diagonal(whole)))
     determinant = sum(float(np.log(np.diagonal(f, axis1=-2, axis2=-1)).sum()) for f in (factor, outer))
@@ -153,6 +153,12 @@ def solve(tangent: Tangent, normal: Normal, spread: Floats | None) -> Solved:
     push[:, on] = (mixed @ within[:, own_numbers:, None])[..., 0]
     log = float(-0.5 * (square + normal.constant) - determinant)
     return Solved(log, step, within[:, :own_numbers], push, determinant)
+
+
+def block(gram: Floats, rows: Ints, columns: Ints) -> Floats:
+    """(E, r, c) of (E, n, n) products, in one piece: a stack of matrices that is not in C's order is multiplied forty
+    times as slowly."""
+    return np.take(np.take(gram, rows, axis=1), columns, axis=2)
 
 
 def acting(root: Floats) -> Ints:

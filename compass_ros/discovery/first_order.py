@@ -49,6 +49,8 @@ class Ranked:
     """Whether these recordings would show the largest that is physical by SIGMAS."""
 
 
+BOTH = ((0, 1), (0, 1))
+"""Sums over episodes and rows."""
 Products = tuple[Floats, Floats, Floats]
 """Of some pushes: among each other, with the parameters, with the residual; own numbers taken out."""
 
@@ -80,9 +82,9 @@ class FirstOrder:
         gram, cross, pull = products
         moved = gram @ weights
         return self._projected(
-            np.tensordot(weights, moved, ((0, 1), (0, 1))),
-            np.tensordot(weights, cross, ((0, 1), (0, 1))),
-            np.tensordot(weights, pull, ((0, 1), (0, 1))),
+            np.tensordot(weights, moved, BOTH),
+            np.tensordot(weights, cross, BOTH),
+            np.tensordot(weights, pull, BOTH),
         )
 
     def _products(self, pushes: Ints) -> Products:
@@ -100,9 +102,8 @@ class FirstOrder:
         weighted = columns * self._weight[:, :, None]
         with_own = tangent.own.transpose(0, 2, 1) @ weighted
         taken = self._taken @ with_own
-        gram = np.einsum("edn,edm->nm", weighted, columns) - np.einsum("eln,elm->nm", with_own, taken)
-        cross = np.einsum("edn,edp->np", weighted, tangent.parameters)
-        cross -= np.einsum("eln,elp->np", taken, self._own[:, :, :p])
+        gram = np.tensordot(weighted, columns, BOTH) - np.tensordot(with_own, taken, BOTH)
+        cross = np.tensordot(weighted, tangent.parameters, BOTH) - np.tensordot(taken, self._own[:, :, :p], BOTH)
         pull = np.einsum("edn,ed->n", weighted, tangent.residual)
         pull -= np.einsum("eln,el->n", taken, self._own[:, :, -1] - tangent.own_away)
         return self._projected(gram, cross, pull)

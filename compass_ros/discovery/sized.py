@@ -17,6 +17,7 @@ from compass_ros.discovery.evidence import (
     Normal,
     Tangent,
     acting,
+    block,
     cholesky,
     log_mean,
     residual_of,
@@ -110,6 +111,7 @@ class Reduced:
         half = np.linalg.solve(factor, np.concatenate([gram[:, own][:, :, rest], with_own], axis=2))
         self._left = np.concatenate([gram[:, rest][:, :, rest], last[:, rest]], axis=2)
         self._left -= half[:, :, : len(rest)].transpose(0, 2, 1) @ half
+        self._width = self._left.shape[2]
         squares = squares + np.sum(tangent.own_away**2) + np.sum(tangent.away**2) + normal.constant
         self._squares = squares - np.sum(half[:, :, len(rest) :] ** 2, axis=(0, 1))
         self._determinant = float(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum())
@@ -119,11 +121,10 @@ class Reduced:
     def axes(self, spread: Spread | None) -> Axes:
         p, first = self._p, self._first
         if spread is None:
-            return Axes(np.zeros((1, 0)), np.zeros((1, 0, p + self._left.shape[2] - first)))
+            return Axes(np.zeros((1, 0)), np.zeros((1, 0, p + self._width - first)))
         root, on = spread.root, acting(spread.root)
         turned = np.swapaxes(root[..., on, :], -2, -1)
-        rows = self._left[:, p + on]
-        among, columns = rows[:, :, p + on], np.concatenate([rows[:, :, :p], rows[:, :, first:]], axis=2)
+        among, columns = block(self._left, p + on, p + on), block(self._left, p + on, np.r_[:p, first : self._width])
         products = turned @ among @ np.swapaxes(turned, -2, -1)
         across = turned @ columns
         if spread.shared:

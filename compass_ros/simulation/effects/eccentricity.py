@@ -22,8 +22,9 @@ def _sensing(sample: Sample, numbers: Floats, context: Context) -> Sample:
 
     def eccentric(time: Floats) -> Floats:
         seen = sample(time)
-        once = cosine * (np.cos(seen) - 1) + sine * np.sin(seen)
-        return np.asarray(seen + once + cosine_2 * (np.cos(2 * seen) - 1) + sine_2 * np.sin(2 * seen))
+        across, along = np.sin(seen), np.cos(seen)
+        twice = 2 * across * (sine_2 * along - cosine_2 * across)  # cos(2 q) - 1 = -2 sin(q)^2
+        return np.asarray(seen + cosine * (along - 1) + sine * across + twice)
 
     return eccentric
 
