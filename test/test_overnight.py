@@ -92,7 +92,9 @@ def test_a_calibration_that_was_stopped_stops_the_night_and_is_no_failure(night:
 
 
 @pytest.mark.parametrize(("what", "group"), [(signal.SIGTERM, False), (signal.SIGINT, True), (signal.SIGTERM, True)])
-def test_a_signal_stops_what_runs_and_the_night(night: Path, what: signal.Signals, group: bool) -> None:
+def test_a_signal_stops_what_runs_and_the_night(
+    night: Path, what: signal.Signals, group: bool, hear_ctrl_c: None
+) -> None:
     """`kill` of the script alone; Ctrl-C and a scheduler's end, which all of its processes get."""
     (night / "waits.txt").touch()
     running = begun(night)
