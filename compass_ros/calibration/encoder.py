@@ -53,20 +53,22 @@ def encoder_step(series: Sequence[Floats], finest: float) -> float:
     """
     seen = [one[~np.isnan(one)] for one in series]
     single = _SINGLE * max((float(np.abs(one).max()) for one in seen if len(one)), default=0.0)
-    change = np.abs(np.concatenate([np.diff(one, 2) for one in seen] or [np.zeros(0)]))  # small where it is fast too
+    second = np.concatenate([np.diff(one, 2) for one in seen] or [np.zeros(0)])  # small where it is fast too
+    change = np.sort(np.abs(second))
     finest = max(finest, single)
     least, most = 0.1 * single, float(change.max(initial=0.0)) / _DIGITS
     count = int(np.log(most / least) / np.log(_RATIO)) + 1 if most > least > 0 else 0
     digits = [0.0, *(least * _RATIO ** np.arange(count))]
-    return max(_spacing(seen, change, max(finest, _DIGITS * digit), digit) for digit in digits)
+    found = (_spacing(seen, change, max(finest, _DIGITS * digit), digit) for digit in reversed(digits))
+    return next((step for step in found if step), 0.0)  # of the coarsest: finer ones see the same lattice again
 
 
 def _spacing(seen: Sequence[Floats], change: Floats, finest: float, digit: float) -> float:
     """The greatest common spacing, of `finest` or more, of values that were rounded to a `digit` (0: to none).
 
-    `change`: (n,) sizes of second differences.
+    `change`: (n,) sizes of second differences, the smallest first.
     """
-    moved = np.sort(change[change > max(0.1 * finest, 2.5 * digit)])  # rounded thrice, one value differs by two digits
+    moved = change[change > max(0.1 * finest, 2.5 * digit)]  # rounded thrice, one value differs by two digits
     if len(moved) < _FEWEST:
         return 0.0
     least = moved[int(_BELOW * len(moved))]

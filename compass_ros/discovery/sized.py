@@ -111,7 +111,6 @@ class Reduced:
         half = np.linalg.solve(factor, np.concatenate([gram[:, own][:, :, rest], with_own], axis=2))
         self._left = np.concatenate([gram[:, rest][:, :, rest], last[:, rest]], axis=2)
         self._left -= half[:, :, : len(rest)].transpose(0, 2, 1) @ half
-        self._width = self._left.shape[2]
         squares = squares + np.sum(tangent.own_away**2) + np.sum(tangent.away**2) + normal.constant
         self._squares = squares - np.sum(half[:, :, len(rest) :] ** 2, axis=(0, 1))
         self._determinant = float(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum())
@@ -121,12 +120,13 @@ class Reduced:
     def axes(self, spread: Spread | None) -> Axes:
         p, first = self._p, self._first
         if spread is None:
-            return Axes(np.zeros((1, 0)), np.zeros((1, 0, p + self._width - first)))
+            return Axes(np.zeros((1, 0)), np.zeros((1, 0, p + self._left.shape[2] - first)))
         root, on = spread.root, acting(spread.root)
         turned = np.swapaxes(root[..., on, :], -2, -1)
-        among, columns = block(self._left, p + on, p + on), block(self._left, p + on, np.r_[:p, first : self._width])
+        columns = np.r_[:p, first : self._left.shape[2]]
+        among, beside = block(self._left, p + on, p + on), block(self._left, p + on, columns)
         products = turned @ among @ np.swapaxes(turned, -2, -1)
-        across = turned @ columns
+        across = turned @ beside
         if spread.shared:
             products, across = products.sum(axis=0, keepdims=True), across.sum(axis=0, keepdims=True)
         values, axes = np.linalg.eigh(products)
