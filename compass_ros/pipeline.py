@@ -68,8 +68,11 @@ def _calibrate(
 
     fit, held_out = split(used, config)
     cut = windows(cell, fit)
-    most = config.windows or most_windows(cell.spec.windows.length_s) if cell.spec.windows else config.episodes
-    data = recordings(cell, unlike(cell, cut, most) if cell.spec.windows else evenly(cut, most))
+    if spec := cell.spec.windows:
+        chosen = unlike(cell, cut, config.windows or most_windows(spec.length_s))
+    else:
+        chosen = evenly(cut, config.episodes)
+    data = recordings(cell, chosen)
     judge = recordings(cell, evenly(windows(cell, held_out or fit), config.episodes)).numbered(len(data.names))
     simulator = simulator.driven(data.drives + judge.drives)
     noise = noise_of(cell, data)
