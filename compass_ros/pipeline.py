@@ -19,7 +19,7 @@ from compass_ros.estimation import estimate_parameters
 from compass_ros.planning.next_experiment import with_next
 from compass_ros.posing import Posed, noise_of
 from compass_ros.progress import Steady
-from compass_ros.selection import evenly, most_windows, split, unlike
+from compass_ros.selection import evenly, fitted, split
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.numerics import unlike_scene
 from compass_ros.simulation.replay import recordings
@@ -67,12 +67,7 @@ def _calibrate(
         return replace(one, warnings=(*told, *checked.said, *one.warnings), left_out=left_out)
 
     fit, held_out = split(used, config)
-    cut = windows(cell, fit)
-    if spec := cell.spec.windows:
-        chosen = unlike(cell, cut, config.windows or most_windows(spec.length_s))
-    else:
-        chosen = evenly(cut, config.episodes)
-    data = recordings(cell, chosen)
+    data = recordings(cell, fitted(cell, windows(cell, fit), config))
     judge = recordings(cell, evenly(windows(cell, held_out or fit), config.episodes)).numbered(len(data.names))
     simulator = simulator.driven(data.drives + judge.drives)
     noise = noise_of(cell, data)

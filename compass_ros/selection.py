@@ -32,6 +32,13 @@ def evenly(episodes: Sequence[Episode], most: int) -> list[Episode]:
     return [ordered[i] for i in np.round(np.linspace(0, len(ordered) - 1, most)).astype(int)]
 
 
+def fitted(cell: Cell, cut: Sequence[Episode], config: CalibrationConfig) -> list[Episode]:
+    """What is fitted of the windows of all recordings to fit."""
+    if spec := cell.spec.windows:
+        return unlike(cell, cut, config.windows or most_windows(spec.length_s))
+    return evenly(cut, config.episodes)
+
+
 def most_windows(length_s: float) -> int:
     """How many windows of a length are fitted where nobody says it."""
     return int(np.clip(round(TOGETHER_S / length_s), *WINDOWS))

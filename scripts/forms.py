@@ -18,6 +18,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from compass_ros import selection
 from compass_ros.calibration.refine import Refined, refine
 from compass_ros.cells import Cell, load
 from compass_ros.config import CalibrationConfig
@@ -29,7 +30,6 @@ from compass_ros.discovery.neighbours import STEPS, modest, rank
 from compass_ros.discovery.race import race
 from compass_ros.estimation import estimate_parameters
 from compass_ros.posing import Posed, noise_of
-from compass_ros.selection import evenly, split, unlike
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.replay import recordings
 from compass_ros.simulation.windows import usable, windows
@@ -93,9 +93,8 @@ def calibrated(cell: Cell, episodes: Sequence[Episode]) -> tuple[Hypothesis, Sim
     """The plain simulator at its fit, as `pipeline.calibrate` comes to it."""
     config = CalibrationConfig(threads=1)
     sound, _ = usable(cell, episodes)
-    fit, held_out = split(sound, config)
-    cut = windows(cell, fit)
-    data = recordings(cell, unlike(cell, cut, config.windows) if cell.spec.windows else evenly(cut, config.episodes))
+    fit, held_out = selection.split(sound, config)
+    data = recordings(cell, selection.fitted(cell, windows(cell, fit), config))
     judge = recordings(cell, windows(cell, held_out)).numbered(len(data.names))
     simulator = Simulator(cell, threads=1).driven(data.drives + judge.drives)
     noise = noise_of(cell, data)

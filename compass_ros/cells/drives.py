@@ -23,6 +23,9 @@ _OF_TARGET = {"ctrl": 0, "qfrc": 1, "xfrc": 2, "mocap": 3}
 _ONE = {int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)}
 FIELDS = {"input_delay_s": "delay_s", "input_scale": "scale", "input_offset": "offset"}
 """Parameters of an input, and the number of its YAML that each takes the place of."""
+RUN_IN_S = 1.0
+"""How long before a window its commands count, for drives that remember them (a lag, a play, a profile): a robot under
+position control forgets where it began within a second."""
 KEPT = 256
 """Series at time steps that are kept, since every rollout of a window asks for them: a budget of memory, 36 MB for
 seven joints in windows of 5 s at 2 ms. Working them out anew takes a tenth of a search on a two-joint arm."""
@@ -73,11 +76,13 @@ class Drives:
         for i, bound in enumerate(self._bound):
             bound.begin(positions, values, window, [d.time_s[i] for d in bank], [d.value[i] for d in bank])
 
-    def fill(self, controls: Floats, values: Floats, inputs: Floats, bank: Sequence[Drive], time_step: float) -> Floats:
+    def fill(
+        self, controls: Floats, values: Floats, inputs: Floats, bank: Sequence[Drive], time_step: float, early: int = 0
+    ) -> Floats:
         """(B, T, size) what drives MuJoCo: (B, T, nu) controls with the recorded inputs of each row's window in place.
 
         (B, P) values of the cell's parameters, (B, A) inputs; the last of these says which Drive of the bank. Without a
-        bank nothing is recorded, and what is driven rests.
+        bank nothing is recorded, and what is driven rests. `early`: how many of the steps lie before the window.
         """
         batch, steps, nu = controls.shape
         out = np.empty((batch, steps, self.size))
@@ -85,7 +90,7 @@ class Drives:
         out[..., :nu] = controls
         window = inputs[:, self._column].astype(int)
         for i, bound in enumerate(self._bound if bank else ()):
-            bound.write(out, values, window, bank, i, time_step)
+            bound.write(out, values, window, bank, i, (time_step, early))
         return out
 
     def _places(self, model: mujoco.MjModel, spec: InputSpec, where: str) -> Ints:
@@ -118,14 +123,14 @@ class _Bound:
         self._numbers = {name: _Number(cell, spec, name, getattr(spec, name), where) for name in FIELDS.values()}
 
     def write(
-        self, out: Floats, values: Floats, window: Ints, bank: Sequence[Drive], which: int, time_step: float
+        self, out: Floats, values: Floats, window: Ints, bank: Sequence[Drive], which: int, clock: tuple[float, int]
     ) -> None:
         delay, scale, offset = (self._numbers[name].of(values) for name in ("delay_s", "scale", "offset"))
         # Rows of one window with one delay share their series: of a Jacobian's rows nearly all do.
         keys, same = np.unique(np.column_stack([window, delay]), axis=0, return_inverse=True)
         rated, linear = tuple(self._rated), self._spec.hold == "linear"
         for k, key in enumerate(keys):
-            means = _at_steps(bank[int(key[0])], which, tuple(key[1:]), rated, linear, out.shape[1], time_step)
+            means = _at_steps(bank[int(key[0])], which, tuple(key[1:]), rated, linear, out.shape[1], clock)
             for row in np.flatnonzero(same.ravel() == k):
                 out[row][:, span(self._places)] = means * scale[row] + np.where(self._rated, 0.0, offset[row])
 
@@ -192,12 +197,12 @@ def _at_steps(
     rated: tuple[bool, ...],
     linear: bool,
     steps: int,
-    time_step: float,
+    clock: tuple[float, int],
 ) -> Floats:
     """(T, D) of one input of a drive, each number late by its delay: its mean over each time step; its rate, where that
-    is asked for. Not to be changed."""
+    is asked for. `clock`: the time step, and how many of the steps lie before time 0. Not to be changed."""
     time_s, value = drive.time_s[which], drive.value[which]
-    edges, late = time_step * np.arange(steps + 1), np.array(delay)
+    edges, late = clock[0] * np.arange(-clock[1], steps - clock[1] + 1), np.array(delay)
     means = held(time_s, value, edges, late, linear)
     if any(rated):
         means = np.where(rated, _rates(time_s, value, edges, late), means)

@@ -100,13 +100,23 @@ def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str], u
             widen(known, less, better, unknown > 0)
 
 
-def shape_anew(known: Known) -> None:
+def shape_anew(known: Known, unknown: float) -> None:
     """Look for the shapes of the best model's law on each of several sites beside the law on the others, where the fit
-    is not at the noise: they were found about a fit that lacked the law on all of them, which may have been bent."""
+    is not at the noise: they were found about a fit that lacked the law on all of them, which may have been bent.
+
+    Not where the same law once more on each of these sites, at its best shapes, leaves the model below `unknown`, the
+    log odds of a free discrepancy.
+    """
     for best, odds in known.ordered[:1]:
         count = Counter(a.effect.name for a in best.laws)
         searched = [a for a in best.laws if count[a.effect.name] > 1 and any(q.grid for q in a.effect.quantities)]
-        for attached in [] if best.at_noise else searched:
+        if best.at_noise or not searched:
+            continue
+        first = FirstOrder(best.response)
+        once_more = sum(r.gain for a in searched for r in first.ranked(Candidate(a))[:1])
+        if odds + once_more < unknown:
+            continue
+        for attached in searched:
             rest = known.without(best, [attached])
             again = FirstOrder(rest[0].response).ranked(Candidate(attached))[:1] if rest else []
             if rest and again and rest[1] + again[0].gain > odds:

@@ -71,13 +71,14 @@ def friction_that_holds(plain: Hypothesis, threshold: float) -> Cell | None:
     other = _simulated(plain, held, np.zeros(1), threshold, threshold)
     if other is None or _gained(plain, other) <= threshold:
         return None
-    tangent = other.response.tangent
-    return held if solve(tangent, tangent.normal, None).log - plain.free.alone > threshold else None
+    before, after = (solve(h.response.tangent, h.response.tangent.normal, None).log for h in (plain, other))
+    return held if after - before > threshold else None
 
 
 def _simulated(plain: Hypothesis, cell: Cell, foretold: Floats, surprise: float, best: float) -> Hypothesis | None:
-    """The plain model fitted anew with a cell of other numerics; None where these cannot gain more than `best` of log
-    likelihood, or do what is `foretold` (E, F, C) but for less than the `surprise` [log odds]."""
+    """The plain model fitted anew with a cell of other numerics, or as it is where that gains more than `best` of log
+    likelihood; None where these cannot, or do what is `foretold` (E, F, C) but for less than the `surprise` [log
+    odds]."""
     simulator, likelihood, fit = plain.simulator, plain.likelihood, plain.fit
     other = Simulator(cell, threads=simulator.threads).driven(simulator.physics.bank)
     beside = played(likelihood, other)
@@ -88,7 +89,11 @@ def _simulated(plain: Hypothesis, cell: Cell, foretold: Floats, surprise: float,
     weighted = np.sqrt(robust_weight(residual, fit.robust))
     if float(np.linalg.norm(weighted * residual) * np.linalg.norm(weighted * moved)) / kappa <= best:
         return None
-    return Hypothesis((), other, beside, minimise(beside, fit.point, fit.free, STEPS, fit.robust, 1.0))
+    begun = minimise(beside, fit.point, fit.free, 0, fit.robust)
+    found = Hypothesis((), other, beside, begun)
+    if _gained(plain, found) > best:
+        return found  # a fit would only add to it
+    return replace(found, fit=minimise(beside, fit.point, fit.free, STEPS, fit.robust, 1.0, begun.linear))
 
 
 def _gained(plain: Hypothesis, other: Hypothesis) -> float:

@@ -75,7 +75,7 @@ def search(plain: Hypothesis, first: Sequence[Ranked], candidates: Sequence[Cand
     while ranked:
         widen(known, best, ranked, found.unknown > 0)
         finish(known, others)
-        shape_anew(known)
+        shape_anew(known, found.unknown)
         finish(known, others)
         exchange(known, candidates, widened, found.unknown, least)
         join(known, candidates)

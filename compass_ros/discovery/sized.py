@@ -24,7 +24,7 @@ from compass_ros.discovery.evidence import (
     solve,
 )
 from compass_ros.discovery.settings import A_DECADE, SHOWN
-from compass_ros.types import Floats
+from compass_ros.types import Floats, Ints
 
 ROUNDS = 2
 """How often weights are taken anew, as long as the bound rises by RISE: a tenth of what odds are read to."""
@@ -116,6 +116,16 @@ class Reduced:
         self._determinant = float(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum())
         self._away = tangent.away
         self._rounding = 1 + ROUNDING * np.diagonal(gram[:, : self._p, : self._p].sum(axis=0))
+        self._known: dict[bytes, tuple[Floats, Floats]] = {}
+
+    def _products(self, on: Ints) -> tuple[Floats, Floats]:
+        """Of some pushes: (E, a, a) among each other, (E, a, p + m) with parameters and residuals; many discrepancies
+        have the same ones."""
+        key, p = on.tobytes(), self._p
+        if key not in self._known:
+            columns = np.r_[:p, self._first : self._left.shape[2]]
+            self._known[key] = block(self._left, p + on, p + on), block(self._left, p + on, columns)
+        return self._known[key]
 
     def axes(self, spread: Spread | None) -> Axes:
         p, first = self._p, self._first
@@ -123,8 +133,7 @@ class Reduced:
             return Axes(np.zeros((1, 0)), np.zeros((1, 0, p + self._left.shape[2] - first)))
         root, on = spread.root, acting(spread.root)
         turned = np.swapaxes(root[..., on, :], -2, -1)
-        columns = np.r_[:p, first : self._left.shape[2]]
-        among, beside = block(self._left, p + on, p + on), block(self._left, p + on, columns)
+        among, beside = self._products(on)
         products = turned @ among @ np.swapaxes(turned, -2, -1)
         across = turned @ beside
         if spread.shared:

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from compass_ros.cells import Cell
-from compass_ros.cells.drives import Drive, Drives
+from compass_ros.cells.drives import RUN_IN_S, Drive, Drives
 from compass_ros.cells.dynamics import Dynamics
 from compass_ros.cells.sensors import units_of
 from compass_ros.cells.signals import Signal
@@ -166,21 +166,23 @@ class Physics:
         """(B, T, n) what drives MuJoCo (`drives.parts`), controls as actuators follow them; None where nothing does."""
         if not self.drives.size:
             return None
-        nu, command = self.model.nu, self.of_command(inputs)
+        command = self.of_command(inputs)
+        laws = [(*one, law) for one in self.acting(values) if (law := one[0].effect.controls) is not None]
+        early = round(RUN_IN_S / self.time_step) if laws and self.cell.spec.inputs else 0
         driven = self.dynamics.controls(self.of_cell(values), command, steps)
+        if early:
+            driven = np.pad(driven, ((0, 0), (early, 0), (0, 0)))
         if self.cell.spec.inputs:
-            driven = self.drives.fill(driven, self.of_cell(values), command, self.bank, self.time_step)
-        controls, recorded = driven[..., :nu], {name for i in self.cell.spec.inputs for name in i.targets}
-        for attached, numbers, sites in self.acting(values):
-            if attached.effect.controls is not None:
-                context = self.context(sites, values)
-                for drive in sites:
-                    columns = list(drive.actuators)
-                    before = controls[:, 0, columns] if recorded & set(drive.names) else None
-                    before = self._standing(drive, values, inputs) if before is None else before
-                    told = replace(context, sites=(drive,), before=before)
-                    controls[:, :, columns] = attached.effect.controls(controls[:, :, columns], numbers, told)
-        return np.ascontiguousarray(driven)
+            driven = self.drives.fill(driven, self.of_cell(values), command, self.bank, self.time_step, early)
+        recorded = {name for i in self.cell.spec.inputs for name in i.targets}
+        for _, numbers, sites, law in laws:
+            context = self.context(sites, values)
+            for drive in sites:
+                columns, known = list(drive.actuators), bool(recorded & set(drive.names))
+                own = np.s_[:, 0 if known else early :, columns]
+                before = driven[:, 0, columns] if known else self._standing(drive, values, inputs)
+                driven[own] = law(driven[own], numbers, replace(context, sites=(drive,), before=before))
+        return np.ascontiguousarray(driven[:, early:])
 
     def _standing(self, drive: Site, values: Floats, inputs: Floats) -> Floats | None:
         """(B, 1) the command at which a position servo stands at the start; None for other drives, which rest at 0."""

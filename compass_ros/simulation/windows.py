@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from compass_ros.cells import Cell
-from compass_ros.cells.drives import Drive
+from compass_ros.cells.drives import RUN_IN_S, Drive
 from compass_ros.cells.series import InputSpec
 from compass_ros.cells.signals import Signal
 from compass_ros.cells.start import state_names
@@ -144,7 +144,7 @@ def _window(cell: Cell, episode: Episode, start_ns: int, end_ns: int) -> Episode
 
 
 def _driving(cell: Cell, spec: InputSpec, track: Track, start_ns: int) -> Track:
-    """What an input says from a window's start to its end, as early and as late as its delay may be.
+    """What an input says from RUN_IN_S before a window's start to its end, as early and as late as its delay may be.
 
     With all of a long recording in each of its windows, time and memory would grow with the square of its length.
     """
@@ -152,7 +152,7 @@ def _driving(cell: Cell, spec: InputSpec, track: Track, start_ns: int) -> Track:
     for p, one in zip(cell.parameters, cell.spec.parameters, strict=False):
         if one.field.partition("[")[0] == "input_delay_s" and one.of == spec.name:
             delays += [p.low, p.high]
-    begin_ns = start_ns - math.ceil(max(delays) / _NS)
+    begin_ns = start_ns - math.ceil((max(delays) + RUN_IN_S) / _NS)
     end_ns = start_ns + math.ceil((cell.duration - min(delays)) / _NS)
     first = max(int(np.searchsorted(track.stamp_ns, begin_ns, side="right")) - 1, 0)
     return _chosen(track, slice(first, int(np.searchsorted(track.stamp_ns, end_ns)) + 1))

@@ -36,3 +36,21 @@ static void torque_speed(const mjModel* m, mjData* d, const Term* term) {
   double limit = fmax(1 - fabs(speed) * p[1], 0) / p[0];
   if (fabs(force) > limit) exerts_more(m, d, term->id, copysign(limit, force) - force);
 }
+
+// What drives make of (n, steps) commands, in their place: they go to each as fast as they may, from rest at `before`, and
+// slow down in time to stand there. p: of each, (n, 2), one over the largest rate and acceleration; 0 for no limit.
+void compass_profile(int64_t n, int64_t steps, double* told, const double* p, const double* before, double dt) {
+  for (int64_t i = 0; i < n; i++, p += 2) {
+    const double fastest = p[0] > 0 ? 1 / p[0] : INFINITY, gain = p[1] > 0 ? dt / p[1] : INFINITY;  // of speed in a step
+    double at = before[i], speed = 0;
+    for (int64_t k = 0; k < steps; k++, told++) {
+      const double ahead = *told - at, away = fabs(ahead), least = away / dt;
+      // from the largest of these speeds on, `gain` less in each step leads to where it shall stand
+      const double braking = p[1] > 0 ? 0.5 * gain * (sqrt(1 + 8 * least / gain) - 1) : INFINITY;
+      const double wanted = copysign(fmin(fmin(least, braking), fastest), ahead);
+      speed = within(wanted, speed - gain, speed + gain);
+      at = speed == copysign(least, ahead) ? *told : at + speed * dt;
+      *told = at;
+    }
+  }
+}

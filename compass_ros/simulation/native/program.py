@@ -162,6 +162,15 @@ def evaluate(term: Term, states: Floats, gravity: float) -> Floats:
     return out
 
 
+def profile(told: Floats, limits: Floats, before: Floats, time_step: float) -> Floats:
+    """(B, T) what drives make of commands with (B, 2) limits of rate and acceleration, one over each, 0 for none; from
+    rest at (B,) places."""
+    out = np.array(told, dtype=np.float64, order="C")
+    given = [np.ascontiguousarray(one, dtype=np.float64) for one in (limits, before)]
+    _library().compass_profile(*out.shape, out.ctypes.data, *(one.ctypes.data for one in given), time_step)
+    return out
+
+
 def _address(model: mujoco.MjModel | mujoco.MjSpec) -> int:
     """Of what C calls mjModel (the one that the callback will see) or mjSpec."""
     return int(model._address)  # noqa: SLF001 - MuJoCo offers it under this name alone
@@ -216,6 +225,8 @@ def _library() -> ctypes.PyDLL:
     library.compass_forget.restype = None
     library.compass_evaluate.argtypes = [ctypes.c_int64, *2 * [ctypes.c_void_p], ctypes.c_double, ctypes.c_void_p]
     library.compass_evaluate.restype = None
+    library.compass_profile.argtypes = [*2 * [ctypes.c_int64], *3 * [ctypes.c_void_p], ctypes.c_double]
+    library.compass_profile.restype = None
     library.compass_init.argtypes = len(_CALLED) * [ctypes.c_void_p]
     library.compass_init.restype = ctypes.c_int
     mj = mujoco_library()

@@ -104,6 +104,32 @@ def test_a_limited_command_is_nearest_to_what_was_told_at_its_rate(rate: float, 
     np.testing.assert_array_equal(followed("rate_limit", told, 0.0), told)
 
 
+@pytest.mark.parametrize("fastest", [0.0, 3.0, 0.5])
+@pytest.mark.parametrize("acceleration", [5.0, 39.0])
+@pytest.mark.parametrize("far", [0.2, -1.0])
+def test_a_profile_stands_at_its_command_as_soon_as_it_can(fastest: float, acceleration: float, far: float) -> None:
+    """From rest to rest: a triangle of speed, or a trapezoid where it would be faster than it may (Siciliano 2009)."""
+    found = profiled(np.full(6000, far), 1 / fastest if fastest else 0.0, 1 / acceleration)
+    speed = np.diff(np.append(0.0, found)) / STEP
+    assert np.abs(speed).max() <= (fastest or np.inf) * (1 + 1e-9)
+    assert np.abs(np.diff(np.append(0.0, speed))).max() <= acceleration * STEP * (1 + 1e-9)
+    most = fastest if fastest and fastest**2 < acceleration * abs(far) else np.sqrt(acceleration * abs(far))
+    takes = abs(far) / most + most / acceleration
+    assert np.flatnonzero(found != far)[-1] * STEP == pytest.approx(takes, abs=3 * STEP)
+    assert np.abs(found).max() <= abs(far) + acceleration * STEP**2
+
+
+def test_a_profile_cannot_follow_what_turns_faster_than_it() -> None:
+    """A sine that asks for less acceleration is followed; of one that asks for four times as much, a parabola each way
+    is left at most: a / (32 f^2) high."""
+    time, most = STEP * np.arange(20000), 20.0
+    for share, frequency in ((0.9, 1.0), (4.0, 3.0)):
+        height = share * most / (2 * np.pi * frequency) ** 2
+        found = profiled(height * np.sin(2 * np.pi * frequency * time), 0.0, 1 / most)[10000:]
+        expected = height if share < 1 else most / (32 * frequency**2)
+        assert found.max() == pytest.approx(expected, rel=0.02 if share < 1 else 0.15)
+
+
 @pytest.mark.parametrize("width", [0.05, 0.3, 1.0])
 @pytest.mark.parametrize("shape", [np.sin, np.sign, lambda x: x, lambda x: np.abs(np.sin(3 * x)), lambda x: 0 * x + 1])
 def test_a_command_with_play_stays_within_it_and_moves_only_at_its_ends(width: float, shape: Shape) -> None:
@@ -122,8 +148,14 @@ def test_a_gain_error_scales_the_command() -> None:
     np.testing.assert_allclose(followed("gain_error", np.arange(5.0), 0.1), 1.1 * np.arange(5.0))
 
 
-def followed(name: str, told: Floats, number: float) -> Floats:
-    """(T,) what a drive makes of (T,) commands."""
-    hook = effect(name).controls
+def followed(name: str, told: Floats, *numbers: float) -> Floats:
+    """(T,) what a drive makes of (T,) commands, the rest of its numbers 0."""
+    hook, left = effect(name).controls, len(effect(name).quantities) - len(numbers)
     assert hook is not None
-    return np.asarray(hook(told[None, :, None], np.array([[number]]), Context((), {}, (), (), STEP))[0, :, 0])
+    row = np.array([[*numbers, *left * [0.0]]])
+    return np.asarray(hook(told[None, :, None], row, Context((), {}, (), (), STEP))[0, :, 0])
+
+
+def profiled(told: Floats, inverse_rate: float, inverse_acceleration: float) -> Floats:
+    """(T,) what a drive with a profile makes of (T,) commands."""
+    return followed("rate_limit", told, inverse_rate, inverse_acceleration)

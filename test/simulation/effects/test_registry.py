@@ -16,7 +16,7 @@ from scripts.effects_table import BEGIN, END, PAGE, formula, table
 from test.simulation.table import DESCRIBED, WIDE, attached, cell, simulator, values
 
 UNITS = {"1", "m", "s", "rad", "Hz", "rad/s", "m/s", "m/s^2", "1/m", "1/s", "s/m", "1/m^2", "N m/rad"}
-UNITS |= {"N", "N m", "N/m", "kg", "kg m", "kg m^2", "rad/N m", "1/N^2 m^2"}
+UNITS |= {"s^2", "N", "N m", "N/m", "kg", "kg m", "kg m^2", "rad/N m", "1/N^2 m^2"}
 NAMES = {
     "dynamics": "table_tilt viscous_drag quadratic_drag crosswind fan_field swirl point_attraction friction_patch "
     "friction_gradient anisotropic_friction stribeck_friction coulomb_friction magnus pulsating_lift spring "
