@@ -9,7 +9,7 @@ import numpy as np
 
 from compass_ros.assembly import assemble
 from compass_ros.calibration.refine import Refined, refine
-from compass_ros.calibration.safeguard import moved_starts
+from compass_ros.calibration.safeguard import left_in_few, moved_starts
 from compass_ros.cells import Cell
 from compass_ros.checks.check import check
 from compass_ros.config import CalibrationConfig
@@ -82,6 +82,13 @@ def _calibrate(
     def result(found: Discovery) -> Result:
         return assemble(cell, config, posed, bool(held_out), estimate, found)
 
+    told.extend([estimate.note] if estimate.note else [])
+    if refined is not None:
+        few = left_in_few(refined.likelihood, refined.fit.linear.residual, posed.data.names)
+        told.extend(filter(None, (moved_starts(refined), few)))
+    if len(used) < len(sound):
+        said = f"{len(used)} of {len(sound)} episodes were used, evenly over the order of recording"
+        told.append(f"{said}; the option `episodes` takes more")
     if checked.bad:
         found = data_bad(checked.sentence)
     elif not config.discover:
@@ -91,10 +98,6 @@ def _calibrate(
             begun = not_evaluated("the search has not ended")
             keep(noted(result(begun)), begun)
         found = searched(posed, estimate, refined, config, steady.share(first, 1.0))
-    told.extend(filter(None, (estimate.note, moved_starts(refined) if refined is not None else "")))
-    if len(used) < len(sound):
-        said = f"{len(used)} of {len(sound)} episodes were used, evenly over the order of recording"
-        told.append(f"{said}; the option `episodes` takes more")
     return noted(result(found)), found
 
 

@@ -9,7 +9,7 @@ answers: by construction none is farther.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,6 +27,10 @@ MOVED_FAR = 2.0
 """How far first states are moved, in standard deviations of what is stated of them (rms), from which that is said:
 three quarters of it, in mean square, are no such error. By chance eight numbers come that far once in ten thousand
 fits (chi-square of eight degrees above 32)."""
+
+FEW, MUCH, ABOVE = 0.1, 0.5, 0.2
+"""Share of the episodes in which so much of what a fit leaves above the noise is worth a word, where that is more than
+this share of the noise. They choose words and no verdict."""
 
 
 def no_farther(likelihood: Likelihood, refined: Refined, values: Floats, distance: Distance) -> Refined:
@@ -58,6 +62,22 @@ def moved_starts(refined: Refined) -> str:
         return ""
     said = f"the fit moved the first states by {far:.1f} times the error that is stated of them (rms)"
     return f"{said}: the scene, a number that is not tuned, or what they were measured with is wrong"
+
+
+def left_in_few(likelihood: Likelihood, residual: Floats, names: Sequence[str]) -> str:
+    """What a user is told where half of the square of an (E, F, C) residual above the noise is in few of the episodes
+    with these names; empty: it is not, or there is little."""
+    seen = ~np.isnan(likelihood.measured)
+    above = np.sum(np.where(seen, residual**2 - 1, 0.0), axis=(1, 2))
+    if above.sum() <= ABOVE * seen.sum():
+        return ""
+    order = np.argsort(-above, kind="stable")
+    count = int(np.searchsorted(np.cumsum(above[order]), MUCH * above.sum())) + 1
+    if count > FEW * len(names):
+        return ""
+    share, kind = min(above[order[:count]].sum() / above.sum(), 1.0), "windows" if likelihood.windowed else "episodes"
+    listed = ", ".join(names[i] for i in order[:count])
+    return f"{100 * share:.0f} % of what the fit leaves above the noise is in {count} of {len(names)} {kind}: {listed}"
 
 
 def _stayed(likelihood: Likelihood, point: Point) -> Refined:

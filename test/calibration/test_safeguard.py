@@ -13,6 +13,7 @@ from compass_ros.calibration.launches import with_launches
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.problem import Problem
 from compass_ros.calibration.refine import refine, standard_errors
+from compass_ros.calibration.safeguard import left_in_few
 from compass_ros.types import Floats, Ints, silent
 from test.calibration.toys import likelihood, oscillation
 
@@ -155,3 +156,20 @@ def test_what_the_whole_episodes_show_is_found_where_their_beginnings_mislead() 
     estimate, _ = causal_map_refined(problem(moved), silent)
     assert estimate.values[0] == pytest.approx(0.0, abs=0.02)
     assert "one that begins with whole episodes is at" in estimate.note
+
+
+def test_episodes_that_hold_most_of_what_is_left_are_named() -> None:
+    """Two of forty, of which one holds half of it; not where all hold as much, nor where noise is all that is left."""
+    given = likelihood(oscillation, (0.0,), np.ones((40, 1)))
+    names = [f"shot {i}" for i in range(40)]
+    noise = np.random.default_rng(0).normal(size=given.measured.shape)
+    assert left_in_few(given, noise, names) == ""
+    assert left_in_few(given, 3 * noise, names) == ""
+    noise[7] += 10.0
+    noise[31] += 5.0
+    found = "80 % of what the fit leaves above the noise is in 1 of 40 episodes: shot 7"
+    assert left_in_few(given, noise, names) == found
+    noise[32] += 10.0
+    assert left_in_few(given, noise, names).endswith(
+        "89 % of what the fit leaves above the noise is in 2 of 40 episodes: shot 32, shot 7"
+    )
