@@ -106,7 +106,9 @@ PICTURES: dict[str, Picture] = {
     "torque_saturation": Picture(
         servo([1 / 1.0, 0.0], ("servo",)), "hard moves take longer and overshoot, easy ones are right"
     ),
-    "rate_limit": Picture(command([0.35], steps), "steps become ramps"),
+    "rate_limit": Picture(
+        command([0.35, 0.1], steps), "steps become ramps, with round ends; of fast sines less is left, all at once"
+    ),
     "gain_error": Picture(command([-0.2], swing), "every command is too small or too large by the same share"),
     "hysteresis": Picture(command([0.5], swing), "flat tops, and lost motion at each reversal"),
     "camera_latency": Picture(moving([0.03]), "wrong by speed times a delay; right at rest"),

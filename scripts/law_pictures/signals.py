@@ -66,7 +66,8 @@ def sensed(
     assert law.sensing is not None
     columns = true(time[None]).shape[2]
     context = Context(sites, {}, (tuple(range(columns)),), ((),), 1e-3)
-    return np.asarray(law.sensing(true, np.array([numbers]), context)(time[None])[0])
+    rest = [0.0] * (len(law.quantities) - len(numbers))
+    return np.asarray(law.sensing(true, np.array([[*numbers, *rest]]), context)(time[None])[0])
 
 
 def signal(numbers: Sequence[float], amplitude: float = 1.0) -> Draw:

@@ -166,7 +166,7 @@ def profile(told: Floats, limits: Floats, before: Floats, time_step: float) -> F
     """(B, T) what drives make of commands with (B, 2) limits of rate and acceleration, one over each, 0 for none; from
     rest at (B,) places."""
     out = np.array(told, dtype=np.float64, order="C")
-    given = [np.ascontiguousarray(one, dtype=np.float64) for one in (limits, before)]
+    given = np.array(limits, dtype=np.float64).reshape(len(out), 2), np.array(before, dtype=np.float64)
     _library().compass_profile(*out.shape, out.ctypes.data, *(one.ctypes.data for one in given), time_step)
     return out
 
