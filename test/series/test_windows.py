@@ -10,14 +10,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from compass_ros.cells import Cell, load
+from compass_ros.cells.drives import RUN_IN_S
 from compass_ros.config import calibration_config
 from compass_ros.errors import DataError
 from compass_ros.operation.current import Current
 from compass_ros.pipeline import calibrate
 from compass_ros.simulation import Simulator
+from compass_ros.simulation.effects import Attached, effect
 from compass_ros.simulation.manifold import apart, charted, on_manifold
 from compass_ros.simulation.replay import recordings
-from compass_ros.simulation.windows import FEWEST, MOST, near, usable, windows
+from compass_ros.simulation.windows import FEWEST, MOST, drive, near, usable, windows
 from compass_ros.types import Episode, Floats, Track
 from test.series.arms import CELL, PARAMETERS, START_NS, command, episode, recorded, write_cell
 
@@ -117,7 +119,7 @@ def test_a_window_has_what_drives_it_and_no_more(tmp_path: Path, name: str) -> N
     target[np.random.default_rng(1).random(target.shape) < lacking] = np.nan
     whole = episode("run", time, target, smooth(40.0, 200.0, 0.001)[1])
     found = windows(cell, [whole])
-    most = (cell.duration + bounds[1] - bounds[0] + 0.4) * 200 + 3
+    most = (RUN_IN_S + cell.duration + bounds[1] - bounds[0] + 0.4) * 200 + 3
     assert max(len(w.inputs[0].stamp_ns) for w in found) <= most
     of_all = [replace(w, inputs=whole.inputs) for w in found]
     seen = []
@@ -127,6 +129,33 @@ def test_a_window_has_what_drives_it_and_no_more(tmp_path: Path, name: str) -> N
         values = np.tile(cell.values({"elbow@actuation@delay": delay}), (len(own), 1))
         seen.append(simulator.observe(values, simulator.inputs(data.inputs), data.time_s))
     np.testing.assert_allclose(seen[0], seen[1], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("law", "numbers"), [("first_order_lag", (0.1,)), ("rate_limit", (0.0, 0.01)), ("hysteresis", (0.05,))]
+)
+def test_a_drive_with_a_memory_knows_what_it_was_told_before_its_window(
+    tmp_path: Path, law: str, numbers: tuple[float, ...]
+) -> None:
+    """As if it had followed the whole recording."""
+    cell = load(write_cell(tmp_path))
+    time, target = command(20.0, 4, 200.0)
+    whole = episode("run", time, target, smooth(20.0, 200.0, 0.001)[1])
+    data = recordings(cell, windows(cell, [whole]))
+    simulator = Simulator(cell, threads=1).driven((drive(cell, whole), *data.drives))
+    physics = simulator.with_effects([Attached(effect(law), ("shoulder",))]).physics
+    inputs = simulator.inputs(data.inputs)
+    values = np.tile(np.append(cell.values({}), numbers), (len(inputs), 1))
+    steps = round(2.0 / simulator.time_step)
+    inputs[:, -1] = 0
+    at_once = physics.controls(values[:1], inputs[:1], len(inputs) * steps)
+    inputs[:, -1] = 1 + np.arange(len(inputs))
+    found = physics.controls(values, inputs, steps)
+    assert at_once is not None
+    assert found is not None
+    apart = np.abs(found[..., 0] - at_once[0, :, 0].reshape(found.shape[:2])).max(axis=1)
+    assert np.abs(found[..., 0] - np.roll(found[..., 0], 1, axis=0))[1:, 0].max() > 0.05
+    assert apart.max() < 1e-3
 
 
 @pytest.mark.parametrize(
