@@ -19,6 +19,7 @@ from compass_ros.calibration.cost import Point, start
 from compass_ros.calibration.identifiability import IDENTIFIED, together
 from compass_ros.calibration.problem import Allowance, Problem
 from compass_ros.calibration.refine import COARSE, Refined, refine, standard_errors
+from compass_ros.calibration.residuals import FLOOR
 from compass_ros.calibration.safeguard import farther, no_farther
 from compass_ros.types import Estimate, Floats, Graph, Iteration, Progress, Report
 
@@ -75,7 +76,7 @@ def to_estimate(problem: Problem, refined: Refined, trace: tuple[Iteration, ...]
     identifiable[free] = refined.alone < IDENTIFIED
     shared = together(refined.among, identifiable[free], values[free], [parameters[i] for i in free])
     graph = intervention_graph(problem, refined)
-    floor = refined.chi_square < 1.2
+    floor = refined.chi_square < FLOOR
     reason = f"chi-square {refined.chi_square:.2f}: " + (
         "the noise floor is reached" if floor else "above the noise floor, something else differs"
     )

@@ -11,6 +11,10 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.noise import integrated_correlation_time
 from compass_ros.types import Floats
 
+FLOOR = 1.2
+"""Mean square of a residual [sigma^2] up to which a fit is called at the noise floor: what else is in it is less than
+half of the noise (rms)."""
+
 
 def residual_at(likelihood: Likelihood, point: Point) -> Floats:
     """(E, F, C) residuals at a point."""

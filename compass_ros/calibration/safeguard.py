@@ -18,6 +18,7 @@ from compass_ros.calibration.cost import ROBUST, Point, launches_away, start
 from compass_ros.calibration.launches import with_launches
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import Refined, calmed, concluded, freed, polish, scaled
+from compass_ros.calibration.residuals import FLOOR
 from compass_ros.calibration.roughness import with_roughness
 from compass_ros.types import Floats
 
@@ -28,9 +29,9 @@ MOVED_FAR = 2.0
 three quarters of it, in mean square, are no such error. By chance eight numbers come that far once in ten thousand
 fits (chi-square of eight degrees above 32)."""
 
-FEW, MUCH, ABOVE = 0.1, 0.5, 0.2
-"""Share of the episodes in which so much of what a fit leaves above the noise is worth a word, where that is more than
-this share of the noise. They choose words and no verdict."""
+FEW, MUCH = 0.1, 0.5
+"""Share of the episodes in which so much of what a fit leaves above the noise is worth a word. Were it scattered over
+them as an exponential, the largest tenth would have p (1 - log p), a third. They choose words and no verdict."""
 
 
 def no_farther(likelihood: Likelihood, refined: Refined, values: Floats, distance: Distance) -> Refined:
@@ -69,7 +70,7 @@ def left_in_few(likelihood: Likelihood, residual: Floats, names: Sequence[str]) 
     with these names; empty: it is not, or there is little."""
     seen = ~np.isnan(likelihood.measured)
     above = np.sum(np.where(seen, residual**2 - 1, 0.0), axis=(1, 2))
-    if above.sum() <= ABOVE * seen.sum():
+    if above.sum() <= (FLOOR - 1) * seen.sum():
         return ""
     order = np.argsort(-above, kind="stable")
     count = int(np.searchsorted(np.cumsum(above[order]), MUCH * above.sum())) + 1

@@ -25,7 +25,8 @@ FIELDS = {"input_delay_s": "delay_s", "input_scale": "scale", "input_offset": "o
 """Parameters of an input, and the number of its YAML that each takes the place of."""
 RUN_IN_S = 1.0
 """How long before a window its commands count, for drives that remember them (a lag, a play, a profile): a robot under
-position control forgets where it began within a second."""
+position control forgets where it began within a second. A lag of 0.1 s, a play and a profile that can follow are then
+as if they had followed the whole recording, to 1 mrad (`pytest test/series/test_windows.py -k memory`)."""
 KEPT = 256
 """Series at time steps that are kept, since every rollout of a window asks for them: a budget of memory, 36 MB for
 seven joints in windows of 5 s at 2 ms. Working them out anew takes a tenth of a search on a two-joint arm."""
