@@ -107,54 +107,6 @@ def _gram(parts: Sequence[Floats], root: Floats) -> Floats:
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """Log evidence and where its maximum lies."""
-
-    log: float
-    parameters: Floats
-    """(p,) change of the parameters, in standard deviations of the prior."""
-    own: Floats
-    """(E, l)"""
-    pushes: Floats
-    """(E, H) posterior mean of the discrepancy."""
-    determinant: float
-    """What the log evidence has lost by the widths of all posteriors beside their priors."""
-
-
-def solve(tangent: Tangent, normal: Normal, spread: Floats | None) -> Solved:
-    """Log evidence and maximum with a discrepancy `spread` z, z standard normal: (H, q), or (E, H, q) where episodes
-    differ; None: without."""
-    gram, p, own_numbers = normal.gram, tangent.parameters.shape[2], tangent.own.shape[2]
-    mixed = np.zeros((tangent.pushes.shape[2], 0)) if spread is None else spread
-    on = acting(mixed)
-    mixed = np.broadcast_to(mixed[..., on, :], (len(gram), len(on), mixed.shape[-1]))
-    turned = mixed.transpose(0, 2, 1)
-    own, hats, q = slice(p, p + own_numbers), p + own_numbers + on, mixed.shape[2]
-    inner = np.empty((len(gram), own_numbers + q, own_numbers + q))
-    inner[:, :own_numbers, :own_numbers] = gram[:, own, own]
-    inner[:, :own_numbers, own_numbers:] = block(gram, np.r_[own], hats) @ mixed
-    inner[:, own_numbers:, :own_numbers] = inner[:, :own_numbers, own_numbers:].transpose(0, 2, 1)
-    inner[:, own_numbers:, own_numbers:] = turned @ block(gram, hats, hats) @ mixed
-    factor = cholesky(inner + np.eye(own_numbers + q))
-    half = np.linalg.solve(factor, np.concatenate([gram[:, own, :p], turned @ block(gram, hats, np.arange(p))], axis=1))
-    taken, whole = np.einsum("eij,eik->jk", half, half), gram[:, :p, :p].sum(axis=0)
-    outer = cholesky(whole - taken + np.diag(1 + ROUNDING * np.diagonal(whole)))
-    determinant = sum(float(np.log(np.diagonal(f, axis1=-2, axis2=-1)).sum()) for f in (factor, outer))
-    last = gram[:, :-1, -1]
-    pulled = np.concatenate([last[:, own] - tangent.own_away, (turned @ last[:, hats, None])[..., 0]], axis=1)
-    back = np.linalg.solve(factor, pulled[..., None])[..., 0]
-    pull = last[:, :p].sum(axis=0) - np.einsum("eip,ei->p", half, back) - tangent.away
-    step = -np.linalg.solve(outer.T, np.linalg.solve(outer, pull))
-    square = gram[:, -1, -1].sum() + np.sum(tangent.own_away**2) + np.sum(tangent.away**2)
-    square += pull @ step - np.sum(back**2)
-    within = -np.linalg.solve(factor.transpose(0, 2, 1), (half @ step + back)[..., None])[..., 0]
-    push = np.zeros((len(gram), tangent.pushes.shape[2]))
-    push[:, on] = (mixed @ within[:, own_numbers:, None])[..., 0]
-    log = float(-0.5 * (square + normal.constant) - determinant)
-    return Solved(log, step, within[:, :own_numbers], push, determinant)
-
-
 def block(gram: Floats, rows: Ints, columns: Ints) -> Floats:
     """(E, r, c) of (E, n, n) products, in one piece: a stack of matrices that is not in C's order is multiplied forty
     times as slowly."""
@@ -174,13 +126,6 @@ def cholesky(matrix: Floats) -> Floats:
     scale = np.sqrt(np.diagonal(matrix, axis1=-2, axis2=-1))
     unit = matrix / scale[..., :, None] / scale[..., None, :]
     return np.asarray(np.linalg.cholesky(unit + ROUNDING * np.eye(unit.shape[-1])) * scale[..., :, None])
-
-
-def residual_of(tangent: Tangent, solved: Solved) -> Floats:
-    """(E, D) what is left where everything is at its maximum."""
-    left = tangent.residual + tangent.parameters @ solved.parameters
-    left += (tangent.own @ solved.own[:, :, None])[..., 0] + (tangent.pushes @ solved.pushes[:, :, None])[..., 0]
-    return np.asarray(left)
 
 
 def log_mean(logs: Sequence[Floats] | Sequence[float] | Floats) -> Floats:

@@ -14,9 +14,9 @@ from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import Strongest, growing
 from compass_ros.calibration.residuals import covariance, typical_residual
 from compass_ros.calibration.settle import settled
-from compass_ros.discovery.evidence import solve
 from compass_ros.discovery.first_order import WIDTH, Ranked
 from compass_ros.discovery.hypothesis import Hypothesis, played, widened
+from compass_ros.discovery.sized import best_parameters
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats, Ints
@@ -106,7 +106,7 @@ def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:
     beside = replace(tangent, residual=tangent.residual + moved)
     change = np.zeros(len(parent.fit.free))
     inside = parent.response.inside
-    change[inside] = solve(beside, beside.normal, None).parameters[: len(inside)]
+    change[inside] = best_parameters(beside)[: len(inside)]
     return change
 
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtri
 
-from compass_ros.calibration.least_squares import Fit
+from compass_ros.calibration.least_squares import Fit, normal_equations
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.residuals import covariance, variances
 from compass_ros.discovery.discrepancy import Free, free, spread, with_law
@@ -61,6 +61,14 @@ class Hypothesis:
     def above_noise(self) -> float:
         """Squared residual above what noise alone leaves [sigma^2]."""
         return max(2 * self.fit.point.cost - self.likelihood.measurements, 0.0)
+
+    @cached_property
+    def promised(self) -> float:
+        """Fall of half the squared residual that one more Gauss-Newton step promises [sigma^2]."""
+        hessian, gradient = normal_equations(
+            self.likelihood, self.fit.point, self.fit.linear, self.fit.free, self.fit.robust
+        )
+        return 0.5 * float(gradient @ np.linalg.solve(hessian, gradient))
 
     @property
     def at_noise(self) -> bool:

@@ -10,9 +10,9 @@ from compass_ros.calibration.cost import robust_weight
 from compass_ros.calibration.least_squares import minimise, normal_equations
 from compass_ros.calibration.residuals import residual_at
 from compass_ros.cells import Cell
-from compass_ros.discovery.evidence import solve
 from compass_ros.discovery.hypothesis import Hypothesis, played
 from compass_ros.discovery.nuisances import creeping_joints, finite_step, moved_by
+from compass_ros.discovery.sized import log_alone
 from compass_ros.simulation import Simulator
 from compass_ros.simulation.numerics import other_numerics
 from compass_ros.types import Floats
@@ -71,7 +71,7 @@ def friction_that_holds(plain: Hypothesis, threshold: float) -> Cell | None:
     other = _simulated(plain, held, np.zeros(1), threshold, threshold)
     if other is None or _gained(plain, other) <= threshold:
         return None
-    before, after = (solve(h.response.tangent, h.response.tangent.normal, None).log for h in (plain, other))
+    before, after = (log_alone(h.response.tangent) for h in (plain, other))
     return held if after - before > threshold else None
 
 
@@ -110,6 +110,6 @@ def numerics_as_model(plain: Hypothesis, best: float) -> str:
     for what, options in other_numerics(plain.simulator.options):
         moved = moved_by(plain.simulator, plain.likelihood, plain.fit.point, plain.fit.linear.residual, options)
         changed = replace(tangent, residual=tangent.residual + moved.reshape(shape))
-        if solve(changed, changed.normal, None).log - plain.free.alone > best:
+        if log_alone(changed) - plain.free.alone > best:
             return f"what is left goes away with {what}"
     return ""

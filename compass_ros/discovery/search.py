@@ -27,6 +27,9 @@ from compass_ros.types import Floats
 
 DEEPEST = 3
 """Laws of a model at most, by name: a budget, for each one more is a race more."""
+LAST_STEPS = 2.0
+"""Of the fall that one Gauss-Newton step promises at the end of a fit, as much as its last steps gain at most: of ten
+models of arms, a real SO-101 among them, and of a bouncing ball they gained 0.06 to 1.7 of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,17 +141,21 @@ def _as_probable_without(known: Known, model: Hypothesis, odds: float, laws: Seq
 def _unfinished(known: Known, others: Sequence[float]) -> str | None:
     """The most probable model that is not at its optimum and holds a share of the probability; None: there is none.
 
-    The best one of all too, where a fit that leaves no more than the noise would make it better than all others are: it
-    is compared with a discrepancy, which needs no fit.
+    The best one of all too, where its last steps may make it better than all others are: it is compared with a
+    discrepancy, which needs no fit. They leave the noise at least, and gain at most LAST_STEPS of what one
+    promises.
     """
     total = known.total(others)
     rest, found = -np.inf, None
     ordered = sorted(known.models.items(), key=lambda item: item[1][1])
-    for name, (model, odds) in ordered:
+    for name, (_, odds) in ordered:
         rest = np.logaddexp(rest, odds)  # of this one and all less probable ones
-        could_gain = 0.5 * model.above_noise / model.likelihood.correlation_time
-        could_be_best = name == ordered[-1][0] and odds + could_gain > max(others)
-        if name not in known.finished and (rest - total > log(SLIGHT) or could_be_best):
+        if name not in known.finished and rest - total > log(SLIGHT):
+            found = name
+    if ordered:
+        name, (model, odds) = ordered[-1]
+        could = min(0.5 * model.above_noise, LAST_STEPS * model.promised) / model.likelihood.correlation_time
+        if name not in known.finished and odds + could > max(others):
             found = name
     return found
 

@@ -20,8 +20,6 @@ from compass_ros.discovery.evidence import (
     block,
     cholesky,
     log_mean,
-    residual_of,
-    solve,
 )
 from compass_ros.discovery.settings import A_DECADE, SHOWN
 from compass_ros.types import Floats, Ints
@@ -66,6 +64,18 @@ class Sized:
 
 
 @dataclass(frozen=True, eq=False)
+class Maximum:
+    """Where everything is at its maximum."""
+
+    parameters: Floats
+    """(p,) change of the parameters, in standard deviations of the prior."""
+    pushes: Floats
+    """(E, H) posterior mean of the discrepancy."""
+    residual: Floats
+    """(E, D) what is left."""
+
+
+@dataclass(frozen=True, eq=False)
 class Axes:
     """A discrepancy along the axes of its products, of all episodes together where it is shared."""
 
@@ -73,6 +83,8 @@ class Axes:
     """(E, q) eigenvalues."""
     across: Floats
     """(E, q, p + m) products with parameters and residuals."""
+    directions: Floats
+    """(E, q, q) of what is drawn, each axis a column."""
 
     def shown(self) -> Floats:
         """(S,) sizes from the least that recordings would show to be absent, A_DECADE of each up to 1.
@@ -106,9 +118,10 @@ class Reduced:
         self._first = self._p + tangent.pushes.shape[2]
         own = slice(self._p, self._p + numbers)
         rest = np.delete(np.arange(gram.shape[1] - 1), own)
-        factor = cholesky(gram[:, own, own] + np.eye(numbers))
+        factor = self._factor = cholesky(gram[:, own, own] + np.eye(numbers))
         with_own = last[:, own] - tangent.own_away[:, :, None]
-        half = np.linalg.solve(factor, np.concatenate([gram[:, own][:, :, rest], with_own], axis=2))
+        self._tangent, self._with_own, self._own_pull = tangent, gram[:, own][:, :, rest], with_own[:, :, 0]
+        half = np.linalg.solve(factor, np.concatenate([self._with_own, with_own], axis=2))
         self._left = np.concatenate([gram[:, rest][:, :, rest], last[:, rest]], axis=2)
         self._left -= half[:, :, : len(rest)].transpose(0, 2, 1) @ half
         squares = squares + np.sum(tangent.own_away**2) + np.sum(tangent.away**2) + normal.constant
@@ -130,7 +143,7 @@ class Reduced:
     def axes(self, spread: Spread | None) -> Axes:
         p, first = self._p, self._first
         if spread is None:
-            return Axes(np.zeros((1, 0)), np.zeros((1, 0, p + self._left.shape[2] - first)))
+            return Axes(np.zeros((1, 0)), np.zeros((1, 0, p + self._left.shape[2] - first)), np.zeros((1, 0, 0)))
         root, on = spread.root, acting(spread.root)
         turned = np.swapaxes(root[..., on, :], -2, -1)
         among, beside = self._products(on)
@@ -140,23 +153,46 @@ class Reduced:
             products, across = products.sum(axis=0, keepdims=True), across.sum(axis=0, keepdims=True)
         values, axes = np.linalg.eigh(products)
         known = values > UNTOLD * values[:, -1:]
-        return Axes(np.where(known, values, 0.0), np.where(known[:, :, None], np.swapaxes(axes, -2, -1) @ across, 0.0))
+        across = np.where(known[:, :, None], np.swapaxes(axes, -2, -1) @ across, 0.0)
+        return Axes(np.where(known, values, 0.0), across, axes)
 
     def logs(self, axes: Axes, sizes: Sequence[float] | Floats) -> Floats:
         """(S, m) log evidences."""
-        p, first = self._p, self._first
-        fixed = np.concatenate([self._left[:, :p, :p], self._left[:, :p, first:]], axis=2).sum(axis=0)
-        fixed[:, p:] -= self._away[:, None]
-        out = []
+        p, out = self._p, []
         for size in sizes:
-            taken = axes.across * (size**2 / (1 + size**2 * axes.values))[:, :, None]
-            both = fixed - np.tensordot(axes.across[:, :, :p], taken, axes=([0, 1], [0, 1]))
-            outer = cholesky(both[:, :p] + np.diag(self._rounding))
-            pulled = np.linalg.solve(outer, both[:, p:])
-            square = self._squares - np.einsum("eqm,eqm->m", axes.across[:, :, p:], taken[:, :, p:])
+            shrunk, outer, pulled = self._of_a_size(axes, size)
+            square = self._squares - np.einsum("eqm,eq->m", axes.across[:, :, p:] ** 2, shrunk)
             wide = self._determinant + 0.5 * np.log1p(size**2 * axes.values).sum() + np.log(np.diagonal(outer)).sum()
             out.append(-0.5 * (square - np.sum(pulled**2, axis=0)) - wide)
         return np.array(out)
+
+    def _of_a_size(self, axes: Axes, size: float) -> tuple[Floats, Floats, Floats]:
+        """(E, q) how much a discrepancy takes along its axes, and beside it (p, p) the root of the parameters'
+        precision and (p, m) their pull in its units."""
+        p, first = self._p, self._first
+        fixed = np.concatenate([self._left[:, :p, :p], self._left[:, :p, first:]], axis=2).sum(axis=0)
+        fixed[:, p:] -= self._away[:, None]
+        shrunk = size**2 / (1 + size**2 * axes.values)
+        both = fixed - np.tensordot(axes.across[:, :, :p], axes.across * shrunk[:, :, None], axes=([0, 1], [0, 1]))
+        outer = cholesky(both[:, :p] + np.diag(self._rounding))
+        return shrunk, outer, np.linalg.solve(outer, both[:, p:])
+
+    def maximum(self, spread: Spread | None, axes: Axes, size: float) -> Maximum:
+        """Of the tangent's own residual, beside a discrepancy with its axes."""
+        tangent, p = self._tangent, self._p
+        shrunk, outer, pulled = self._of_a_size(axes, size)
+        step = -np.linalg.solve(outer.T, pulled[:, 0])
+        along = -shrunk * (axes.across[:, :, p] + axes.across[:, :, :p] @ step)
+        pushes = np.zeros((len(tangent.residual), tangent.pushes.shape[2]))
+        if spread is not None:
+            pushes += (spread.root @ (axes.directions @ along[:, :, None]))[..., 0]
+        moved = tangent.residual + tangent.parameters @ step + (tangent.pushes @ pushes[:, :, None])[..., 0]
+        pull = (
+            self._own_pull + self._with_own[:, :, :p] @ step + (self._with_own[:, :, p:] @ pushes[:, :, None])[..., 0]
+        )
+        half = np.linalg.solve(self._factor, pull[:, :, None])
+        own = -np.linalg.solve(self._factor.transpose(0, 2, 1), half)
+        return Maximum(step, pushes, moved + (tangent.own @ own)[..., 0])
 
 
 def sized(tangent: Tangent, spreads: Sequence[Spread | None], sizes: Sequence[float] | None = None) -> list[Sized]:
@@ -165,40 +201,40 @@ def sized(tangent: Tangent, spreads: Sequence[Spread | None], sizes: Sequence[fl
     `sizes`: None for those that recordings would show to be absent (`Axes.shown`).
     """
     found: dict[int, Sized] = {}
-    residual, normal, ahead = tangent.residual, tangent.normal, list(range(len(spreads)))
+    normal, ahead = tangent.normal, list(range(len(spreads)))
     for _ in range(1 + ROUNDS):
         reduced = Reduced(tangent, normal)
         before = max((float(one.logs.max()) for one in found.values()), default=-np.inf)
+        highest, best, of_best = -np.inf, 0, reduced.axes(None)
         for i in ahead:
             axes = reduced.axes(spreads[i])
             if i not in found:
                 asked = np.ones(1) if spreads[i] is None else axes.shown() if sizes is None else np.array(sizes)
                 found[i] = Sized(asked, np.full(len(asked), -np.inf))
             found[i] = replace(found[i], logs=np.maximum(found[i].logs, reduced.logs(axes, found[i].sizes)[:, 0]))
-        best = max(ahead, key=lambda i: float(found[i].logs.max()))
-        highest = float(found[best].logs.max())
+            if found[i].logs.max() > highest:
+                highest, best, of_best = float(found[i].logs.max()), i, axes
         if highest < before + RISE:
             break
         size = float(found[best].sizes[np.argmax(found[best].logs)])
-        residual = _maximum(tangent, normal, residual, spreads[best], size)[1]
-        normal = Normal.of(tangent, residual)
+        normal = Normal.of(tangent, reduced.maximum(spreads[best], of_best, size).residual)
         ahead = [i for i in ahead if found[i].logs.max() > highest - FAR]
     return [found[i] for i in range(len(spreads))]
 
 
-def mean(tangent: Tangent, spread: Spread | None, size: float) -> Floats:
+def mean(tangent: Tangent, spread: Spread, size: float) -> Floats:
     """(E, H) posterior mean of a discrepancy of a size."""
-    return _maximum(tangent, tangent.normal, tangent.residual, spread, size)[0]
+    reduced = Reduced(tangent, tangent.normal)
+    return reduced.maximum(spread, reduced.axes(spread), size).pushes
 
 
-def _maximum(
-    tangent: Tangent, normal: Normal, residual: Floats, spread: Spread | None, size: float
-) -> tuple[Floats, Floats]:
-    """(E, H) pushes and (E, D) what is left, where everything is at its maximum, with the weights of a residual."""
-    if spread is None or not spread.shared:
-        found = solve(tangent, normal, None if spread is None else size * spread.root)
-        return found.pushes, residual_of(tangent, found)
-    root = np.broadcast_to(size * spread.root, (len(residual), *spread.root.shape[-2:]))
-    wider = replace(tangent.more(tangent.pushes @ root, np.zeros(root.shape[2])), pushes=tangent.pushes[:, :, :0])
-    found = solve(wider, Normal.of(wider, residual), None)
-    return root @ found.parameters[-root.shape[2] :], residual_of(wider, found)
+def log_alone(tangent: Tangent) -> float:
+    """Log evidence without a discrepancy, with the weights of the residual itself."""
+    reduced = Reduced(tangent, tangent.normal)
+    return float(reduced.logs(reduced.axes(None), np.ones(1))[0, 0])
+
+
+def best_parameters(tangent: Tangent) -> Floats:
+    """(p,) change of the parameters that fits best without a discrepancy, in standard deviations of the prior."""
+    reduced = Reduced(tangent, tangent.normal)
+    return reduced.maximum(None, reduced.axes(None), 1.0).parameters

@@ -10,8 +10,8 @@ from scipy.integrate import quad
 from scipy.stats import multivariate_normal
 
 from compass_ros.calibration.cost import robust_loss
-from compass_ros.discovery.evidence import Normal, Tangent, log_sum, residual_of, solve
-from compass_ros.discovery.sized import Reduced, Spread, sized
+from compass_ros.discovery.evidence import Normal, Tangent, log_sum
+from compass_ros.discovery.sized import Reduced, Spread, log_alone, sized
 from compass_ros.types import Floats
 
 EPISODES, ROWS, PARAMETERS, OWN, PUSHES = 3, 40, 4, 2, 6
@@ -36,18 +36,19 @@ def drawn(seed: int, robust: float = WIDE, correlation_time: float = 1.0) -> Tan
 
 def dense(tangent: Tangent, spread: Floats | None) -> tuple[Floats, Floats, Floats]:
     """(N, m) what (m,) standard normal numbers do to all residuals, and the mean of those numbers."""
-    q = 0 if spread is None else spread.shape[-1]
-    count = PARAMETERS + EPISODES * (OWN + q)
-    columns, mean = np.zeros((EPISODES * ROWS, count)), np.zeros(count)
-    mean[:PARAMETERS] = tangent.away
-    for e in range(EPISODES):
-        rows, first = slice(e * ROWS, (e + 1) * ROWS), PARAMETERS + e * (OWN + q)
-        columns[rows, :PARAMETERS] = tangent.parameters[e]
-        columns[rows, first : first + OWN] = tangent.own[e]
-        mean[first : first + OWN] = tangent.own_away[e]
+    (episodes, rows_of_each), q = tangent.residual.shape, 0 if spread is None else spread.shape[-1]
+    parameters, own = tangent.parameters.shape[2], tangent.own.shape[2]
+    count = parameters + episodes * (own + q)
+    columns, mean = np.zeros((episodes * rows_of_each, count)), np.zeros(count)
+    mean[:parameters] = tangent.away
+    for e in range(episodes):
+        rows, first = slice(e * rows_of_each, (e + 1) * rows_of_each), parameters + e * (own + q)
+        columns[rows, :parameters] = tangent.parameters[e]
+        columns[rows, first : first + own] = tangent.own[e]
+        mean[first : first + own] = tangent.own_away[e]
         if spread is not None:
-            of_episode = np.broadcast_to(spread, (EPISODES, *spread.shape[-2:]))[e]
-            columns[rows, first + OWN : first + OWN + q] = tangent.pushes[e] @ of_episode
+            of_episode = np.broadcast_to(spread, (episodes, *spread.shape[-2:]))[e]
+            columns[rows, first + own : first + own + q] = tangent.pushes[e] @ of_episode
     return columns, mean, tangent.residual.ravel()
 
 
@@ -59,11 +60,17 @@ def test_log_evidence_is_that_of_the_gaussian(seed: int, kind: str, correlation_
     rng = np.random.default_rng(100 + seed)
     shape = {"none": None, "shared": (PUSHES, 5), "by episode": (EPISODES, PUSHES, 5)}[kind]
     spread = None if shape is None else 0.3 * rng.normal(size=shape)
+    reduced = Reduced(tangent, tangent.normal)
+    found = reduced.logs(reduced.axes(None if spread is None else Spread(spread)), [1.0])
+    assert found[0, 0] == pytest.approx(_alone(tangent, spread), abs=1e-8)
+
+
+def _alone(tangent: Tangent, spread: Floats | None) -> float:
+    """Log evidence by the covariance of all residuals."""
     columns, mean, residual = dense(tangent, spread)
-    covariance = correlation_time * np.eye(len(residual)) + columns @ columns.T
-    expected = multivariate_normal.logpdf(residual, -columns @ mean, covariance)
-    constant = 0.5 * len(residual) * np.log(2 * np.pi * correlation_time)
-    assert solve(tangent, tangent.normal, spread).log == pytest.approx(expected + constant, abs=1e-8)
+    covariance = tangent.correlation_time * np.eye(len(residual)) + columns @ columns.T
+    constant = 0.5 * len(residual) * np.log(2 * np.pi * tangent.correlation_time)
+    return float(multivariate_normal.logpdf(residual, -columns @ mean, covariance) + constant)
 
 
 def test_the_maximum_is_that_of_least_squares() -> None:
@@ -71,10 +78,11 @@ def test_the_maximum_is_that_of_least_squares() -> None:
     columns, mean, residual = dense(tangent, spread)
     stacked = np.vstack([columns, np.eye(len(mean))])
     best = np.linalg.lstsq(stacked, np.concatenate([-residual, mean]), rcond=None)[0]
-    found = solve(tangent, tangent.normal, spread)
+    reduced = Reduced(tangent, tangent.normal)
+    found = reduced.maximum(Spread(spread), reduced.axes(Spread(spread)), 1.0)
     assert found.parameters == pytest.approx(best[:PARAMETERS], abs=1e-9)
     left = residual + columns @ best
-    assert residual_of(tangent, found).ravel() == pytest.approx(left, abs=1e-9)
+    assert found.residual.ravel() == pytest.approx(left, abs=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["none", "alike", "by episode", "shared"])
@@ -88,16 +96,15 @@ def test_many_residuals_and_sizes_at_once_are_as_each_alone(kind: str) -> None:
     last, sizes = np.einsum("edn,med->enm", columns, others), (1e-4, 0.3, 20.0)
     reduced = Reduced(tangent, tangent.normal, last, np.sum(others**2, axis=(1, 2)))
     together = reduced.logs(reduced.axes(spread), sizes)
-    alone = [[_alone(replace(tangent, residual=r), spread, size) for r in others] for size in sizes]
+    alone = [[_alone_of_a_size(replace(tangent, residual=r), spread, size) for r in others] for size in sizes]
     assert together == pytest.approx(np.array(alone), abs=1e-8)
 
 
-def _alone(tangent: Tangent, spread: Spread | None, size: float) -> float:
-    """One log evidence, factored anew; what is shared stands among the parameters."""
+def _alone_of_a_size(tangent: Tangent, spread: Spread | None, size: float) -> float:
+    """What is shared stands among the parameters."""
     if spread is None or not spread.shared:
-        return solve(tangent, tangent.normal, None if spread is None else size * spread.root).log
-    wider = tangent.more(size * tangent.pushes @ spread.root, np.zeros(spread.root.shape[2]))
-    return solve(wider, wider.normal, None).log
+        return _alone(tangent, None if spread is None else size * spread.root)
+    return _alone(tangent.more(size * tangent.pushes @ spread.root, np.zeros(spread.root.shape[2])), None)
 
 
 @pytest.mark.parametrize("shared", [False, True])
@@ -112,7 +119,7 @@ def test_the_least_size_is_one_that_its_absence_would_show(shared: bool) -> None
     spread = Spread(rng.normal(size=(EPISODES, PUSHES, 5)), shared)
     size = Reduced(tangent, tangent.normal).axes(spread).shown()[0]
     draws = [replace(tangent, residual=rng.normal(size=(EPISODES, ROWS))) for _ in range(400)]
-    against = [_alone(t, None, 1.0) - _alone(t, spread, size) for t in draws]
+    against = [_alone_of_a_size(t, None, 1.0) - _alone_of_a_size(t, spread, size) for t in draws]
     assert np.mean(against) == pytest.approx(np.log(99), abs=4 * float(np.std(against)) / 20)
 
 
@@ -130,12 +137,15 @@ def test_pushes_that_grow_beyond_all_digits_take_no_more_than_there_is() -> None
     (free,) = sized(tangent, [Spread(np.eye(count))], [1e3])
     assert np.isfinite(free.log)
     assert free.log < 0
+    reduced = Reduced(tangent, tangent.normal)
+    left = reduced.maximum(Spread(np.eye(count)), reduced.axes(Spread(np.eye(count))), 1e3).residual
+    assert np.sum(left**2) < np.sum(tangent.residual**2)
 
 
 def test_a_parameter_that_says_nothing_costs_nothing() -> None:
     tangent = drawn(19)
     wider = tangent.more(np.zeros((EPISODES, ROWS, 2)), np.zeros(2))
-    assert solve(wider, wider.normal, None).log == pytest.approx(solve(tangent, tangent.normal, None).log, abs=1e-9)
+    assert log_alone(wider) == pytest.approx(log_alone(tangent), abs=1e-9)
 
 
 def test_a_parameter_that_explains_nothing_pays_for_its_prior() -> None:
@@ -145,7 +155,7 @@ def test_a_parameter_that_explains_nothing_pays_for_its_prior() -> None:
     column = np.random.default_rng(11).normal(size=empty.residual.shape)
     column -= empty.residual * np.sum(column * empty.residual) / np.sum(empty.residual**2)
     wider = empty.more(column[:, :, None], np.zeros(1))
-    paid = solve(empty, empty.normal, None).log - solve(wider, wider.normal, None).log
+    paid = log_alone(empty) - log_alone(wider)
     assert paid == pytest.approx(0.5 * np.log1p(np.sum(column**2)), abs=1e-9)
 
 
@@ -178,7 +188,7 @@ def test_weights_follow_what_a_discrepancy_explains() -> None:
     tangent = Tangent(residual, none, none, push, np.zeros(0), np.zeros((1, 0)), 4.0, 1.0)
     without, found = sized(tangent, [None, Spread(np.eye(3))], [30.0])
     exact = replace(tangent, robust=WIDE)
-    assert found.log == pytest.approx(solve(exact, exact.normal, 30.0 * np.eye(3)).log, abs=3.0)
+    assert found.log == pytest.approx(_alone(exact, 30.0 * np.eye(3)), abs=3.0)
     assert found.log > without.log + 100
 
 

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
-from compass_ros.calibration.cost import Point
+from compass_ros.calibration.cost import Point, robust_weight
 from compass_ros.calibration.differences import linearise
 from compass_ros.calibration.least_squares import Fit
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.discovery.candidates import Candidate, candidates
-from compass_ros.discovery.evidence import Tangent, solve
+from compass_ros.discovery.evidence import Tangent
 from compass_ros.discovery.first_order import FirstOrder, Ranked, best_sizes
 from compass_ros.discovery.hypothesis import Hypothesis
 from compass_ros.simulation import Simulator
@@ -61,9 +62,15 @@ def test_a_small_law_of_force_is_found_with_its_numbers(
 
 
 def _least(tangent: Tangent) -> float:
-    """Largest log posterior of a linear model, without determinants."""
-    found = solve(tangent, tangent.normal, None)
-    return found.log + found.determinant
+    """Largest log posterior of a linear model, by least squares."""
+    root = np.sqrt(robust_weight(tangent.residual, tangent.robust) / tangent.correlation_time)[:, :, None]
+    columns = np.concatenate(
+        [tangent.parameters * root, block_diag(*(tangent.own * root)).reshape(*root.shape[:2], -1)], 2
+    )
+    columns = columns.reshape(root.size, -1)
+    stacked = np.vstack([columns, np.eye(columns.shape[1])])
+    asked = np.concatenate([-(tangent.residual * root[..., 0]).ravel(), tangent.away, tangent.own_away.ravel()])
+    return -0.5 * float(np.sum((stacked @ np.linalg.lstsq(stacked, asked, rcond=None)[0] - asked) ** 2))
 
 
 def test_a_law_of_commands_is_rolled_out(tmp_path: Path) -> None:
