@@ -288,13 +288,16 @@ def test_the_core_makes_bags_into_a_report(tmp_path: Path) -> None:
     done = without_extras("calibrate", *cell, "--no-discover", "--progress", "none", "--out", tmp_path, *bags)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "report.html").stat().st_size > 1e6
+    said = without_extras("diagnose", tmp_path)
+    assert said.returncode == 1
+    assert "explains" in said.stdout or "missing" in said.stdout
+    assert said.stderr == "compass: needs matplotlib, which is not installed: pip install 'compass_ros[report]'\n"
 
 
 @pytest.mark.parametrize(
     ("words", "library", "brings"),
     [
         (("policy", "RESULT"), "torch", "policy"),
-        (("diagnose", "RESULT"), "matplotlib", "report"),
         (("track", "film.mp4", "--camera", "camera.yaml"), "cv2", "track"),
     ],
 )

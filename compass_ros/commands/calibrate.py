@@ -167,8 +167,8 @@ def run(
         raise typer.Exit(130) from None
     if style is not ProgressStyle.json:
         print_result(result)
-        for warning in (*left_out_lines(result.left_out), *result.warnings):
-            typer.echo(f"note: {warning}", err=True)
+        for line in left_out_lines(result.left_out):
+            typer.echo(f"note: {line}", err=True)
         print(f"report: {os.path.relpath(out / 'report.html')}")
 
 

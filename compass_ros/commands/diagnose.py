@@ -25,7 +25,6 @@ def diagnose(
 
     from compass_ros.commands.report import read_truth
     from compass_ros.reporting.diagnosis import print_diagnosis
-    from compass_ros.reporting.gallery import write_figures
     from compass_ros.reporting.kept import read_all
     from compass_ros.results import make_writable
 
@@ -35,5 +34,7 @@ def diagnose(
     out = figures or folder / "figures"
     make_writable(out)
     print_diagnosis(result, extras)
+    from compass_ros.reporting.gallery import write_figures  # what it needs is an extra, and the words need none
+
     for path in write_figures(result, extras, out):
         typer.echo(f"figure: {os.path.relpath(path)}")

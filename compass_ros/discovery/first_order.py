@@ -17,8 +17,10 @@ from scipy.optimize import lsq_linear
 
 from compass_ros.calibration.cost import robust_weight
 from compass_ros.discovery.candidates import Candidate
+from compass_ros.discovery.evidence import ROUNDING
 from compass_ros.discovery.response import Response
 from compass_ros.discovery.shapes import best_shapes, shape_grid
+from compass_ros.discovery.sized import UNTOLD
 from compass_ros.types import Floats, Ints
 
 SIGMAS = 5.0
@@ -56,11 +58,19 @@ Products = tuple[Floats, Floats, Floats]
 
 
 class FirstOrder:
-    """All laws about one response."""
+    """All laws about one response.
+
+    An episode whose motion is unstable says nothing to first order, and the squares of its pushes would leave no digits
+    of the others': it is left out where ROUNDING of them is more than all of another one's, in the median.
+    """
 
     def __init__(self, response: Response) -> None:
         self.response = response
-        tangent, gram = response.tangent, response.tangent.normal.gram
+        tangent = response.tangent
+        largest = np.abs(tangent.pushes).max(axis=(1, 2), initial=0.0)
+        told = ROUNDING * largest**2 <= np.median(largest) ** 2
+        gram = tangent.normal.gram * told[:, None, None]
+        self._unsaid = 0.5 * float(tangent.normal.gram[~told, -1, -1].sum())
         p, numbers = tangent.parameters.shape[2], tangent.own.shape[2]
         own = slice(p, p + numbers)
         inner = gram[:, own, own] + np.eye(numbers)
@@ -73,7 +83,7 @@ class FirstOrder:
         whole = self._gram.sum(axis=0)
         self._inverse = np.linalg.inv(whole[:p, :p] + np.eye(p))
         self._pull = whole[:p, -1] - tangent.away
-        self._weight = robust_weight(tangent.residual, tangent.robust) / tangent.correlation_time
+        self._weight = robust_weight(tangent.residual, tangent.robust) / tangent.correlation_time * told[:, None]
         self._own = gram[:, own]
         self._taken = np.linalg.inv(inner)
 
@@ -111,6 +121,10 @@ class FirstOrder:
     def _projected(self, gram: Floats, cross: Floats, pull: Floats) -> tuple[Floats, Floats]:
         absorbed = cross @ self._inverse
         return gram - absorbed @ cross.T, pull - absorbed @ self._pull
+
+    def could_gain(self, ranked: Ranked) -> float:
+        """What a law gains, with all that episodes leave of which first order says nothing."""
+        return ranked.gain + self._unsaid
 
     def ranked(self, candidate: Candidate) -> list[Ranked]:
         """A law at its best shapes, each in its neighbourhood, the best first."""
@@ -255,13 +269,14 @@ def _bounds(candidate: Candidate) -> tuple[Floats, Floats, Floats]:
 def _evidence(matrix: Floats, pull: Floats, at: Ints) -> float:
     """Log evidence of some amplitudes of unit prior over their absence."""
     size, axes = _precision(matrix[np.ix_(at, at)], np.ones(len(at)))
-    return 0.5 * float(np.sum((axes.T @ pull[at]) ** 2 / size - np.log(size)))
+    white = np.where(size > 1, axes.T @ pull[at], 0.0)
+    return 0.5 * float(np.sum(white**2 / size - np.log(size)))
 
 
 def best_sizes(matrix: Floats, pull: Floats, low: Floats, high: Floats, prior: Floats) -> tuple[Floats, float]:
     """(n,) amplitudes within bounds that lower the cost most, and by how much, with a Gaussian prior."""
     size, axes = _precision(matrix, prior)
-    white = (axes.T @ (prior * pull)) / np.sqrt(size)
+    white = np.where(size > 1, axes.T @ (prior * pull), 0.0) / np.sqrt(size)
     root = np.sqrt(size)[:, None] * axes.T / prior  # its square is the precision
     sizes = -prior * (axes @ (white / np.sqrt(size)))
     if np.any((sizes < low) | (sizes > high)):
@@ -269,13 +284,14 @@ def best_sizes(matrix: Floats, pull: Floats, low: Floats, high: Floats, prior: F
             sizes = np.clip(sizes, low, high)
         else:
             sizes = lsq_linear(root, -white, (low, high), method="bvls").x
-    return sizes, -float(pull @ sizes + 0.5 * np.sum((root @ sizes) ** 2))
+    return sizes, -float(white @ (root @ sizes) + 0.5 * np.sum((root @ sizes) ** 2))
 
 
 def _precision(matrix: Floats, prior: Floats) -> tuple[Floats, Floats]:
     """(n,) eigenvalues, 1 at least, and (n, n) axes of the posterior's precision in the prior's standard deviations.
 
-    Recordings that tell of two amplitudes by 10^16 the same leave a matrix that is singular in double precision.
+    Recordings that tell of two amplitudes by 10^16 the same leave a matrix that is singular in double precision: 1 is
+    where it tells nothing, and what pulls there is rounding.
     """
     told, axes = np.linalg.eigh(prior[:, None] * matrix * prior)
-    return np.asarray(1 + np.maximum(told, 0.0)), np.asarray(axes)
+    return np.asarray(1 + np.where(told > UNTOLD * told[-1], told, 0.0)), np.asarray(axes)

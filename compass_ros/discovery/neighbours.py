@@ -94,9 +94,10 @@ def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str], u
                 continue
             less, of_less = known_rest
             widened.add(less.name)
-            ranked = rank(FirstOrder(less.response), candidates)
+            about = FirstOrder(less.response)
             worth, price = max(odds, least), known.prior.of_laws
-            better = [r for r in ranked if refuted or of_less + r.gain + price([r.candidate.name]) > worth]
+            ranked = rank(about, candidates)
+            better = [r for r in ranked if refuted or of_less + about.could_gain(r) + price([r.candidate.name]) > worth]
             widen(known, less, better, unknown > 0)
 
 
@@ -113,7 +114,7 @@ def shape_anew(known: Known, unknown: float) -> None:
         if best.at_noise or not searched:
             continue
         first = FirstOrder(best.response)
-        once_more = sum(r.gain for a in searched for r in first.ranked(Candidate(a))[:1])
+        once_more = sum(first.could_gain(r) for a in searched for r in first.ranked(Candidate(a))[:1])
         if odds + once_more < unknown:
             continue
         for attached in searched:

@@ -92,8 +92,9 @@ def search(plain: Hypothesis, first: Sequence[Ranked], candidates: Sequence[Cand
             break
         best, top = leader, odds
         widened.add(best.name)
-        ranked = rank(FirstOrder(best.response), candidates)
-        could = [r for r in ranked if top + r.gain + prior.of_laws([r.candidate.name]) > found.unknown]
+        about = FirstOrder(best.response)
+        ranked = rank(about, candidates)
+        could = [r for r in ranked if top + about.could_gain(r) + prior.of_laws([r.candidate.name]) > found.unknown]
         if not could:
             break  # no law more could come up to a free discrepancy
         if len(names) + 1 == DEEPEST:  # what stays below it there stays below it

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from compass_ros.discovery.candidates import Candidate, candidates
 from compass_ros.discovery.evidence import Tangent
 from compass_ros.discovery.first_order import FirstOrder, Ranked, best_sizes
 from compass_ros.discovery.hypothesis import Hypothesis
+from compass_ros.discovery.response import Response
 from compass_ros.simulation import Simulator
 from compass_ros.types import Floats
 from test.simulation import robots
@@ -107,3 +110,34 @@ def test_sizes_within_bounds_are_the_best_ones(seed: int) -> None:
     grid = np.stack(np.meshgrid(np.linspace(0, 1, 201), np.linspace(-0.5, 0.5, 201)), axis=-1).reshape(-1, 2)
     assert gain == pytest.approx(float(fall(grid).max()), abs=2e-3)
     assert fall(sizes[None])[0] == pytest.approx(gain, abs=1e-9)
+
+
+@pytest.mark.parametrize("amplitudes", [1, 3])
+def test_an_unstable_episode_takes_nothing_of_what_the_others_say(amplitudes: int) -> None:
+    """Its pushes grow to 1e10 sigma and more: beside their squares double precision keeps no digit of the others'."""
+    rng, rows, pushes = np.random.default_rng(31), 200, 12
+    grown = rng.normal(size=(4, rows, pushes))
+    grown[3] = np.exp(np.linspace(0, 30, rows))[:, None] * (1 + 1e-9 * rng.normal(size=(rows, pushes)))
+    columns = grown @ rng.normal(size=(pushes, amplitudes))
+    residual = rng.normal(size=(4, rows)) - 3 * columns.sum(axis=2)
+    residual[3] = 100 * rng.normal(size=rows)
+    none = np.zeros((4, rows, 0))
+    tangent = Tangent(residual, none, none, grown, np.zeros(0), np.zeros((4, 0)), 1e9, 1.0)
+    others = Tangent(residual[:3], none[:3], none[:3], grown[:3], np.zeros(0), np.zeros((3, 0)), 1e9, 1.0)
+    far, prior = np.full(amplitudes, 1e3), np.full(amplitudes, 20.0)
+    gains = []
+    for one, of in ((tangent, columns), (others, columns[:3])):
+        about = FirstOrder(cast("Response", SimpleNamespace(tangent=one)))
+        gains.append(best_sizes(*about.of_columns(of), -far, far, prior)[1])
+    assert gains[0] == pytest.approx(gains[1], rel=1e-9)
+    assert gains[0] < 0.5 * float(np.sum(residual[:3] ** 2))
+    assert gains[0] > 0.45 * float(np.sum((3 * columns[:3].sum(axis=2)) ** 2))
+
+
+def test_what_pulls_where_nothing_is_told_is_rounding() -> None:
+    """Two amplitudes that do the same to sixteen digits: no gain along their difference."""
+    one = np.array([[1e18, 1e18], [1e18, 1e18]])
+    wide = np.full(2, 1e9)
+    sizes, gain = best_sizes(one, np.array([1e9, 1e9 + 1e4]), -wide, wide, np.full(2, 20.0))
+    assert gain == pytest.approx(0.5 * 1e18 / 1e18, rel=1e-3)
+    assert sizes[0] == pytest.approx(sizes[1], rel=1e-6)
