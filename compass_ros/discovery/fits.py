@@ -12,7 +12,7 @@ from compass_ros.calibration.differences import Linear, difference_steps, extend
 from compass_ros.calibration.least_squares import Fit, minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import Strongest, growing
-from compass_ros.calibration.residuals import covariance, typical_residual
+from compass_ros.calibration.residuals import typical_residual
 from compass_ros.calibration.settle import settled
 from compass_ros.discovery.first_order import WIDTH, Ranked
 from compass_ros.discovery.hypothesis import Hypothesis, played, widened
@@ -40,14 +40,24 @@ class Begun:
 
     laws: tuple[Attached, ...]
     """The law, on each of its sites."""
-    point: Point
-    """Of these episodes: their launches, and half their robust sum of squares plus half the prior's."""
-    linear: Linear | None = None
-    """Differences near it, where these are all episodes."""
+    model: Hypothesis
+    """Its parent's laws and this one, with the loss of its parent; its differences are the last of its fit."""
     bent: bool = True
     """Whether it began at its parent's fit, near which its parent's differences hold."""
-    occam: float = 0.0
-    """Log of the share of its prior that these episodes leave: Laplace's factor, by its last differences."""
+
+    @property
+    def point(self) -> Point:
+        """Of these episodes: their launches, and half their robust sum of squares plus half the prior's."""
+        return self.model.fit.point
+
+
+def begun(
+    parent: Hypothesis, laws: Sequence[Attached], rows: Ints, likelihood: Likelihood, fit: Fit, bent: bool
+) -> Begun:
+    """A parent with one law more, fitted to some episodes."""
+    simulator, _ = widened(parent.simulator, parent.likelihood, laws)
+    model = Hypothesis((*parent.laws, *laws), simulator, likelihood, fit, without=parent.bare[rows])
+    return Begun(tuple(laws), model, bent)
 
 
 def telling(parent: Hypothesis) -> Ints:
@@ -86,15 +96,7 @@ def from_parent(parent: Hypothesis, ranked: Ranked, rows: Ints, iterations: int)
     everything = np.concatenate([tuned, len(base.values) + np.arange(len(amplitude))])
     linear = extended(parent.fit.linear.of(rows), likelihood, starts[best], residuals[best], everything)
     fit = minimise(likelihood, starts[best], everything, iterations, parent.fit.robust, 1.0, linear, fresh=False)
-    everywhere = len(rows) == len(parent.likelihood.inputs)
-    return Begun(laws, fit.point, fit.linear if everywhere else None, occam=occam(likelihood, fit))
-
-
-def occam(likelihood: Likelihood, fit: Fit) -> float:
-    """Log of the share of the prior's volume that the recordings leave of what is free (MacKay 1992, Occam's factor):
-    what a model pays for each number that they tell. Rough, by the last differences of a fit; what is left above the
-    noise tells as little as in `covariance`."""
-    return 0.5 * float(np.linalg.slogdet(covariance(likelihood, fit))[1])
+    return begun(parent, laws, rows, likelihood, fit, bent=True)
 
 
 def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:
@@ -120,28 +122,28 @@ def with_law(parent: Hypothesis, values: Floats) -> tuple[Ints, Floats]:
     return np.concatenate([parent.fit.free, own]), steps
 
 
-def whole(parent: Hypothesis, begun: Begun) -> Hypothesis:
+def whole(parent: Hypothesis, one: Begun) -> Hypothesis:
     """A model fitted to all episodes, with exact differences at the end.
 
     One that began at its parent's fit goes on with the differences there as long as they hold. One that did not is
     fitted on a horizon that grows anew: a few episodes say little of most parameters.
     """
-    simulator, likelihood = widened(parent.simulator, parent.likelihood, begun.laws)
-    free, steps = with_law(parent, begun.point.values)
-    if begun.bent:
-        point, linear = _near_parent(parent, begun, likelihood, free, steps)
+    simulator, likelihood = widened(parent.simulator, parent.likelihood, one.laws)
+    free, steps = with_law(parent, one.point.values)
+    if one.bent:
+        point, linear = _near_parent(parent, one, likelihood, free, steps)
     else:
-        point, linear = _grown(parent, begun, likelihood, free, steps), None
+        point, linear = _grown(parent, one, likelihood, free, steps), None
     fit = minimise(likelihood, point, free, FEW, parent.fit.robust, _LAST, linear, steps=steps)
-    return Hypothesis((*parent.laws, *begun.laws), simulator, likelihood, fit, without=parent.bare)
+    return Hypothesis((*parent.laws, *one.laws), simulator, likelihood, fit, without=parent.bare)
 
 
 def _near_parent(
-    parent: Hypothesis, begun: Begun, likelihood: Likelihood, free: Ints, steps: Floats
+    parent: Hypothesis, one: Begun, likelihood: Likelihood, free: Ints, steps: Floats
 ) -> tuple[Point, Linear | None]:
     """Where all episodes go on from a fit to some of them, and differences near it; None: they have to be taken."""
-    point, linear = begun.point, begun.linear
-    if linear is None:
+    point, linear = one.point, one.model.fit.linear
+    if len(point.launch) < len(parent.likelihood.inputs):
         point = Point(point.values, parent.fit.point.launch, np.inf)
         (residual,) = cost(likelihood, [point], parent.fit.robust)[1]
         linear = extended(parent.fit.linear, likelihood, point, residual, free)
@@ -151,12 +153,12 @@ def _near_parent(
     return point, linear
 
 
-def _grown(parent: Hypothesis, begun: Begun, likelihood: Likelihood, free: Ints, steps: Floats) -> Point:
+def _grown(parent: Hypothesis, one: Begun, likelihood: Likelihood, free: Ints, steps: Floats) -> Point:
     """All that is free fitted on a growing horizon of all episodes, shapes of the law that begins at last."""
-    values = begun.point.values
+    values = one.point.values
     wide = np.ones(len(values))
     wide[free] = steps
-    held = len(parent.fit.point.values) + shapes(begun.laws)
+    held = len(parent.fit.point.values) + shapes(one.laws)
     *_, (_, fit) = growing(likelihood, values, held, Strongest(free, wide))
     return fit.point
 

@@ -17,7 +17,7 @@ from compass_ros.calibration.refine import Strongest, growing, strongest
 from compass_ros.calibration.residuals import typical_residual
 from compass_ros.discovery.discrepancy import free
 from compass_ros.discovery.first_order import WIDTH
-from compass_ros.discovery.fits import FEW, Begun, lacking, occam, shapes, with_law
+from compass_ros.discovery.fits import FEW, Begun, begun, lacking, shapes, with_law
 from compass_ros.discovery.hypothesis import Hypothesis, widened
 from compass_ros.discovery.response import respond
 from compass_ros.discovery.settings import PRIOR_UNKNOWN, SLIGHT
@@ -61,7 +61,7 @@ def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats
         ahead = of_each[: max(len(of_each) // ETA, 2)]
         least = found[alive[0]][1].point.cost - log(SLIGHT)
         alive = [i for i in alive if i in ahead or found[i][1].point.cost < least]
-    return [_at_the_end(parent, *_on_its_sites(parent, starts[i][0], *found[i])) for i in alive]
+    return [_at_the_end(parent, rows, *_on_its_sites(parent, starts[i][0], *found[i])) for i in alive]
 
 
 def _on_its_sites(
@@ -79,13 +79,16 @@ def _on_its_sites(
     return tuple(a for a in laws if a not in absent), fewer, point
 
 
-def _at_the_end(parent: Hypothesis, laws: tuple[Attached, ...], likelihood: Likelihood, point: Point) -> Begun:
+def _at_the_end(
+    parent: Hypothesis, rows: Ints, laws: tuple[Attached, ...], likelihood: Likelihood, point: Point
+) -> Begun:
     """Some steps more with all parameters of the parent free, and its loss."""
     free, steps = with_law(parent, point.values)
     robust = max(parent.fit.robust, 3.0 * typical_residual(likelihood, point))
     fit = minimise(likelihood, point, free, FEW, robust, 3.0, steps=steps, fresh=False)
     loss = float(cost(likelihood, [fit.point], parent.fit.robust)[0][0])
-    return Begun(laws, replace(fit.point, cost=loss), bent=False, occam=occam(likelihood, fit))
+    ended = replace(fit, point=replace(fit.point, cost=loss), robust=parent.fit.robust)
+    return begun(parent, laws, rows, likelihood, ended, bent=False)
 
 
 @dataclass(frozen=True, eq=False)
