@@ -31,10 +31,10 @@ def diagnose(
     result, extras = read_all(folder)
     if truth is not None:
         extras = replace(extras, truth=read_truth(truth, result))
-    out = figures or folder / "figures"
-    make_writable(out)
     print_diagnosis(result, extras)
     from compass_ros.reporting.gallery import write_figures  # what it needs is an extra, and the words need none
 
+    out = figures or folder / "figures"
+    make_writable(out)
     for path in write_figures(result, extras, out):
         typer.echo(f"figure: {os.path.relpath(path)}")

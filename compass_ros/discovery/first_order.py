@@ -70,7 +70,8 @@ class FirstOrder:
         largest = np.abs(tangent.pushes).max(axis=(1, 2), initial=0.0)
         told = ROUNDING * largest**2 <= np.median(largest) ** 2
         gram = tangent.normal.gram * told[:, None, None]
-        self._unsaid = 0.5 * float(tangent.normal.gram[~told, -1, -1].sum())
+        self.unsaid = 0.5 * float(tangent.normal.gram[~told, -1, -1].sum())
+        """What the episodes leave of which it says nothing: half their squared residual, as gains are counted."""
         p, numbers = tangent.parameters.shape[2], tangent.own.shape[2]
         own = slice(p, p + numbers)
         inner = gram[:, own, own] + np.eye(numbers)
@@ -121,10 +122,6 @@ class FirstOrder:
     def _projected(self, gram: Floats, cross: Floats, pull: Floats) -> tuple[Floats, Floats]:
         absorbed = cross @ self._inverse
         return gram - absorbed @ cross.T, pull - absorbed @ self._pull
-
-    def could_gain(self, ranked: Ranked) -> float:
-        """What a law gains, with all that episodes leave of which first order says nothing."""
-        return ranked.gain + self._unsaid
 
     def ranked(self, candidate: Candidate) -> list[Ranked]:
         """A law at its best shapes, each in its neighbourhood, the best first."""
@@ -268,15 +265,13 @@ def _bounds(candidate: Candidate) -> tuple[Floats, Floats, Floats]:
 
 def _evidence(matrix: Floats, pull: Floats, at: Ints) -> float:
     """Log evidence of some amplitudes of unit prior over their absence."""
-    size, axes = _precision(matrix[np.ix_(at, at)], np.ones(len(at)))
-    white = np.where(size > 1, axes.T @ pull[at], 0.0)
-    return 0.5 * float(np.sum(white**2 / size - np.log(size)))
+    size, _, white = _posterior(matrix[np.ix_(at, at)], pull[at], np.ones(len(at)))
+    return 0.5 * float(np.sum(white**2 - np.log(size)))
 
 
 def best_sizes(matrix: Floats, pull: Floats, low: Floats, high: Floats, prior: Floats) -> tuple[Floats, float]:
     """(n,) amplitudes within bounds that lower the cost most, and by how much, with a Gaussian prior."""
-    size, axes = _precision(matrix, prior)
-    white = np.where(size > 1, axes.T @ (prior * pull), 0.0) / np.sqrt(size)
+    size, axes, white = _posterior(matrix, pull, prior)
     root = np.sqrt(size)[:, None] * axes.T / prior  # its square is the precision
     sizes = -prior * (axes @ (white / np.sqrt(size)))
     if np.any((sizes < low) | (sizes > high)):
@@ -287,11 +282,13 @@ def best_sizes(matrix: Floats, pull: Floats, low: Floats, high: Floats, prior: F
     return sizes, -float(white @ (root @ sizes) + 0.5 * np.sum((root @ sizes) ** 2))
 
 
-def _precision(matrix: Floats, prior: Floats) -> tuple[Floats, Floats]:
-    """(n,) eigenvalues, 1 at least, and (n, n) axes of the posterior's precision in the prior's standard deviations.
+def _posterior(matrix: Floats, pull: Floats, prior: Floats) -> tuple[Floats, Floats, Floats]:
+    """(n,) eigenvalues, 1 at least, and (n, n) axes of the posterior's precision in the prior's standard deviations,
+    and (n,) the pull along them in the posterior's.
 
     Recordings that tell of two amplitudes by 10^16 the same leave a matrix that is singular in double precision: 1 is
     where it tells nothing, and what pulls there is rounding.
     """
     told, axes = np.linalg.eigh(prior[:, None] * matrix * prior)
-    return np.asarray(1 + np.where(told > UNTOLD * told[-1], told, 0.0)), np.asarray(axes)
+    size = np.asarray(1 + np.where(told > UNTOLD * told[-1], told, 0.0))
+    return size, np.asarray(axes), np.where(size > 1, axes.T @ (prior * pull), 0.0) / np.sqrt(size)

@@ -9,7 +9,7 @@ import numpy as np
 
 from compass_ros.calibration.cost import Point, cost, robust_loss
 from compass_ros.calibration.differences import Linear, difference_steps, extended
-from compass_ros.calibration.least_squares import Fit, minimise
+from compass_ros.calibration.least_squares import minimise
 from compass_ros.calibration.likelihood import Likelihood
 from compass_ros.calibration.refine import Strongest, growing
 from compass_ros.calibration.residuals import typical_residual
@@ -51,15 +51,6 @@ class Begun:
         return self.model.fit.point
 
 
-def begun(
-    parent: Hypothesis, laws: Sequence[Attached], rows: Ints, likelihood: Likelihood, fit: Fit, bent: bool
-) -> Begun:
-    """A parent with one law more, fitted to some episodes."""
-    simulator, _ = widened(parent.simulator, parent.likelihood, laws)
-    model = Hypothesis((*parent.laws, *laws), simulator, likelihood, fit, without=parent.bare[rows])
-    return Begun(tuple(laws), model, bent)
-
-
 def telling(parent: Hypothesis) -> Ints:
     """Episodes that hold enough against a model to tell others apart by; or all of them.
 
@@ -80,7 +71,7 @@ def telling(parent: Hypothesis) -> Ints:
 def from_parent(parent: Hypothesis, ranked: Ranked, rows: Ints, iterations: int) -> Begun:
     """Fitted to some episodes from the first-order solution about its parent's fit."""
     laws = ranked.candidate.parts
-    _, likelihood = widened(parent.simulator, parent.likelihood.of(rows), laws)
+    simulator, likelihood = widened(parent.simulator, parent.likelihood.of(rows), laws)
     amplitude, begins = ranked.candidate.amplitudes, ranked.candidate.begins
     found = solve_beside(parent, ranked)
     tuned, base = parent.fit.free, parent.fit.point
@@ -96,7 +87,7 @@ def from_parent(parent: Hypothesis, ranked: Ranked, rows: Ints, iterations: int)
     everything = np.concatenate([tuned, len(base.values) + np.arange(len(amplitude))])
     linear = extended(parent.fit.linear.of(rows), likelihood, starts[best], residuals[best], everything)
     fit = minimise(likelihood, starts[best], everything, iterations, parent.fit.robust, 1.0, linear, fresh=False)
-    return begun(parent, laws, rows, likelihood, fit, bent=True)
+    return Begun(laws, Hypothesis((*parent.laws, *laws), simulator, likelihood, fit, without=parent.bare[rows]))
 
 
 def solve_beside(parent: Hypothesis, ranked: Ranked) -> Floats:

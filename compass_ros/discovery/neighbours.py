@@ -95,9 +95,9 @@ def exchange(known: Known, candidates: Sequence[Candidate], widened: set[str], u
             less, of_less = known_rest
             widened.add(less.name)
             about = FirstOrder(less.response)
-            worth, price = max(odds, least), known.prior.of_laws
+            worth, price = max(odds, least) - about.unsaid, known.prior.of_laws
             ranked = rank(about, candidates)
-            better = [r for r in ranked if refuted or of_less + about.could_gain(r) + price([r.candidate.name]) > worth]
+            better = [r for r in ranked if refuted or of_less + r.gain + price([r.candidate.name]) > worth]
             widen(known, less, better, unknown > 0)
 
 
@@ -114,8 +114,8 @@ def shape_anew(known: Known, unknown: float) -> None:
         if best.at_noise or not searched:
             continue
         first = FirstOrder(best.response)
-        once_more = sum(first.could_gain(r) for a in searched for r in first.ranked(Candidate(a))[:1])
-        if odds + once_more < unknown:
+        once_more = sum(r.gain for a in searched for r in first.ranked(Candidate(a))[:1])
+        if odds + once_more + first.unsaid < unknown:
             continue
         for attached in searched:
             rest = known.without(best, [attached])

@@ -17,10 +17,11 @@ from compass_ros.calibration.refine import Strongest, growing, strongest
 from compass_ros.calibration.residuals import typical_residual
 from compass_ros.discovery.discrepancy import free
 from compass_ros.discovery.first_order import WIDTH
-from compass_ros.discovery.fits import FEW, Begun, begun, lacking, shapes, with_law
+from compass_ros.discovery.fits import FEW, Begun, lacking, shapes, with_law
 from compass_ros.discovery.hypothesis import Hypothesis, widened
 from compass_ros.discovery.response import respond
 from compass_ros.discovery.settings import PRIOR_UNKNOWN, SLIGHT
+from compass_ros.simulation import Simulator
 from compass_ros.simulation.effects import Attached
 from compass_ros.types import Floats, Ints
 
@@ -66,21 +67,26 @@ def race(parent: Hypothesis, starts: Sequence[tuple[tuple[Attached, ...], Floats
 
 def _on_its_sites(
     parent: Hypothesis, laws: tuple[Attached, ...], likelihood: Likelihood, fit: Fit
-) -> tuple[tuple[Attached, ...], Likelihood, Point]:
+) -> tuple[tuple[Attached, ...], Simulator, Likelihood, Point]:
     """A law that raced on several sites without those where it may be absent, if that leaves any; of what these
     episodes do not show, others decide."""
     simulator, _ = widened(parent.simulator, parent.likelihood, laws)
     model = Hypothesis((*parent.laws, *laws), simulator, likelihood, fit)
     absent = model.zero.absent([a for a in laws if model.zero.shown(a)]) if len(laws) > 1 else ()
     if not 0 < len(absent) < len(laws):
-        return laws, likelihood, fit.point
-    _, fewer, at = lacking(model, absent)
+        return laws, simulator, likelihood, fit.point
+    other, fewer, at = lacking(model, absent)
     point = replace(fit.point, values=fit.point.values[at], cost=np.inf)
-    return tuple(a for a in laws if a not in absent), fewer, point
+    return tuple(a for a in laws if a not in absent), other, fewer, point
 
 
 def _at_the_end(
-    parent: Hypothesis, rows: Ints, laws: tuple[Attached, ...], likelihood: Likelihood, point: Point
+    parent: Hypothesis,
+    rows: Ints,
+    laws: tuple[Attached, ...],
+    simulator: Simulator,
+    likelihood: Likelihood,
+    point: Point,
 ) -> Begun:
     """Some steps more with all parameters of the parent free, and its loss."""
     free, steps = with_law(parent, point.values)
@@ -88,7 +94,8 @@ def _at_the_end(
     fit = minimise(likelihood, point, free, FEW, robust, 3.0, steps=steps, fresh=False)
     loss = float(cost(likelihood, [fit.point], parent.fit.robust)[0][0])
     ended = replace(fit, point=replace(fit.point, cost=loss), robust=parent.fit.robust)
-    return begun(parent, laws, rows, likelihood, ended, bent=False)
+    model = Hypothesis((*parent.laws, *laws), simulator, likelihood, ended, without=parent.bare[rows])
+    return Begun(laws, model, bent=False)
 
 
 @dataclass(frozen=True, eq=False)

@@ -94,7 +94,8 @@ def search(plain: Hypothesis, first: Sequence[Ranked], candidates: Sequence[Cand
         widened.add(best.name)
         about = FirstOrder(best.response)
         ranked = rank(about, candidates)
-        could = [r for r in ranked if top + about.could_gain(r) + prior.of_laws([r.candidate.name]) > found.unknown]
+        best_case = top + about.unsaid
+        could = [r for r in ranked if best_case + r.gain + prior.of_laws([r.candidate.name]) > found.unknown]
         if not could:
             break  # no law more could come up to a free discrepancy
         if len(names) + 1 == DEEPEST:  # what stays below it there stays below it
@@ -143,8 +144,7 @@ def _unfinished(known: Known, others: Sequence[float]) -> str | None:
     """The most probable model that is not at its optimum and holds a share of the probability; None: there is none.
 
     The best one of all too, where its last steps may make it better than all others are: it is compared with a
-    discrepancy, which needs no fit. They leave the noise at least, and gain at most LAST_STEPS of what one
-    promises.
+    discrepancy, which needs no fit. They leave the noise, and gain LAST_STEPS of what one promises, at most.
     """
     total = known.total(others)
     rest, found = -np.inf, None
