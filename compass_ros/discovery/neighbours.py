@@ -164,16 +164,15 @@ def beside(model: Hypothesis, ranked: Sequence[Ranked], prior: Prior) -> list[fl
 
 def probable(begun: Sequence[Begun], prior: Prior) -> list[Begun]:
     """Those that could be probable, and in any case the best two and the best of the best two laws; of each set of laws
-    on the same sites the fit that leaves least.
+    on the same sites the most probable fit.
 
-    By log evidence in the episodes that they were fitted to: what a law leaves may be a discrepancy of its form. Where
-    more than one law is missing none of them comes near, and what is left says little about which is one of them.
+    By log evidence in the episodes that they were fitted to: what a law leaves may be a discrepancy of its form, and of
+    two fits of one law that leave as much one may be in a valley. Where more than one law is missing none of them comes
+    near, and what is left says little about which is one of them.
     """
-    least: dict[frozenset[tuple[str, tuple[str, ...]]], Begun] = {}
-    for one in sorted(begun, key=lambda one: one.point.cost):
-        least.setdefault(frozenset((a.effect.name, a.objects) for a in one.laws), one)
-    odds = [(prior.of_laws(a.effect.name for a in one.laws) + one.model.log_evidence, one) for one in least.values()]
-    ordered = sorted(odds, key=lambda pair: -pair[0])
+    odds = [(prior.of_laws(a.effect.name for a in one.laws) + one.model.log_evidence, one) for one in begun]
+    fits = sorted(odds, key=lambda pair: -pair[0])
+    ordered = first_of_each(fits, lambda pair: frozenset((a.effect.name, a.objects) for a in pair[1].laws))
     could = ordered[0][0] + 2 * log(SLIGHT) if ordered else 0.0
     best_laws = first_of_each(ordered, lambda pair: pair[1].laws[0].effect.name)[:2]
     return [pair[1] for i, pair in enumerate(ordered) if i < 2 or pair[0] > could or pair in best_laws]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import log
 from typing import TypeVar
@@ -165,9 +165,9 @@ def _of_a_size(
     return starts[best].values, residuals[best], np.full(len(numbers), abs(list(sized)[best]) / WIDTH)
 
 
-def first_of_each(ordered: Iterable[Runner], name: Callable[[Runner], str]) -> list[Runner]:
+def first_of_each(ordered: Iterable[Runner], name: Callable[[Runner], Hashable]) -> list[Runner]:
     """The first of each name, in their order."""
-    found: dict[str, Runner] = {}
+    found: dict[Hashable, Runner] = {}
     for one in ordered:
         found.setdefault(name(one), one)
     return list(found.values())
